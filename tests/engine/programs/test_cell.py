@@ -110,28 +110,24 @@ def test_a_target_that_is_a_point_may_be_given_an_orientation(tmp_path: Path) ->
     assert (known.place, known.turned) == (placed, True)
 
 
-@pytest.mark.parametrize(
-    ("entry", "column"),
-    [
+def test_orientations_as_each_maker_writes_them(tmp_path: Path) -> None:
+    for entry, column in (
         ("quaternion: [0, 1, 0, 0]", [0, 0, -1]),
         ("wpr: [180, 0, 0]", [0, 0, -1]),
         ("abc: [0, 90, 0]", [1, 0, 0]),
         ("rxryrz: [90, 0, 90]", [0, -1, 0]),
         ("rotation_vector: [0, 180, 0]", [0, 0, -1]),
-    ],
-)
-def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, column: list[int]) -> None:
-    cell = read(tmp_path, f"tools:\n  t: {{of: controller, translation: [0, 0, 100], {entry}}}\n")
-    placed = cell.tools["t"]
-    assert placed.identified is None
-    assert placed.controller is not None
-    np.testing.assert_allclose(placed.controller.matrix[:3, 2], column, atol=1e-12)
-    np.testing.assert_allclose(placed.controller.matrix[:3, 3], [0, 0, 0.1])
+    ):
+        cell = read(tmp_path, f"tools:\n  t: {{of: controller, translation: [0, 0, 100], {entry}}}\n")
+        placed = cell.tools["t"]
+        assert placed.identified is None, entry
+        assert placed.controller is not None, entry
+        np.testing.assert_allclose(placed.controller.matrix[:3, 2], column, atol=1e-12)
+        np.testing.assert_allclose(placed.controller.matrix[:3, 3], [0, 0, 0.1])
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+def test_what_is_wrong_is_said(tmp_path: Path) -> None:
+    for text, said in (
         ("frames: {}\n", "has no frames"),
         ("tools:\n  t: {of: world}\n", "got 'world'; allowed: flange, controller"),
         ("frames:\n  f: {of: flange}\n", "got 'flange'; allowed: world, base, controller"),
@@ -147,8 +143,6 @@ def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, colu
         ("frames:\n  base: {of: controller, translation: [0, 0, 1]}\n", "its own base at zero"),
         ("tools:\n  flange: {of: flange, controller: {translation: [0, 0, 1]}}\n", "its own flange at zero"),
         ("tools:\n  t: {of: controller, controller: {translation: [0, 0, 1]}}\n", "says what the controller has"),
-    ],
-)
-def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read(tmp_path, text)
+    ):
+        with pytest.raises(InputError, match=said):
+            read(tmp_path, text)

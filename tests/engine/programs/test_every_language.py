@@ -120,9 +120,8 @@ def test_a_comment_is_a_few_lines_and_changes_nothing_that_is_read(language: Lan
         assert after.unknown == before.unknown
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "commented"),
-    [
+def test_where_a_comment_stands() -> None:
+    for name, text, commented in (
         (
             "RAPID",
             "MODULE m (SYSMODULE) CONST num n:=1;\nENDMODULE",
@@ -147,10 +146,8 @@ def test_a_comment_is_a_few_lines_and_changes_nothing_that_is_read(language: Lan
             "/POS\r\n/END\r\n",
         ),
         ("RAPID", "CONST num n:=1;", "CONST num n:=1;"),
-    ],
-)
-def test_where_a_comment_stands(name: str, text: str, commented: str) -> None:
-    assert language_called(name).comment(text, ["a"]) == commented
+    ):
+        assert language_called(name).comment(text, ["a"]) == commented, name
 
 
 @languages
@@ -316,9 +313,8 @@ def test_languages_are_told_apart(language: Language) -> None:
             assert not others, source.path
 
 
-@pytest.mark.parametrize(
-    ("text", "names"),
-    [
+def test_a_text_is_of_one_language_or_of_none() -> None:
+    for text, names in (
         ("", []),
         ("default", []),
         ("! the MODULE is elsewhere\n", []),
@@ -332,10 +328,8 @@ def test_languages_are_told_apart(language: Language) -> None:
         ("/PROG MAIN\n/MN\n   1:J P[1] 100% FINE    ;\n/END\n", ["FANUC LS"]),
         ("def prog():\n  movej([0,0,0,0,0,0])\nend\n", ["URScript"]),
         ("/JOB\n//NAME MAIN\nNOP\nMOVJ C00000 VJ=50.00\nEND\n", ["INFORM"]),
-    ],
-)
-def test_a_text_is_of_one_language_or_of_none(text: str, names: list[str]) -> None:
-    assert [language.name for language in LANGUAGES if language.is_one(text)] == names
+    ):
+        assert [language.name for language in LANGUAGES if language.is_one(text)] == names, text
 
 
 @languages

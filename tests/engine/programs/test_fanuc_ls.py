@@ -7,7 +7,7 @@ by a public repository's notes on it, and from public programs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import pi, radians
 from pathlib import Path
@@ -128,9 +128,8 @@ def test_files_are_programs_of_their_own() -> None:
     assert found.moves[0].routine != found.moves[1].routine
 
 
-@pytest.mark.parametrize(
-    ("between", "is_known"),
-    [
+def test_what_came_before_a_move_is_known_or_not() -> None:
+    for between, is_known in (
         ("DO[1]=ON", True),
         ("!L P[3] 10mm/sec FINE", True),
         ("//CALL AWAY", True),
@@ -147,18 +146,15 @@ def test_files_are_programs_of_their_own() -> None:
         ("J P[9] 10% FINE", False),
         ("L P[3] 10mm/sec FINE Offset,PR[2]", False),
         ("L P[3] 10mm/sec FINE Skip,LBL[2]", False),
-    ],
-)
-def test_what_came_before_a_move_is_known_or_not(between: str, is_known: bool) -> None:
-    found = FANUC_LS.read(
-        [program(["L P[1] 10mm/sec FINE", between, "L P[2] 10mm/sec FINE"], pose(1) + pose(2) + pose(3))]
-    )
-    assert (found.moves[0].routine == found.moves[-1].routine) is is_known
+    ):
+        found = FANUC_LS.read(
+            [program(["L P[1] 10mm/sec FINE", between, "L P[2] 10mm/sec FINE"], pose(1) + pose(2) + pose(3))]
+        )
+        assert (found.moves[0].routine == found.moves[-1].routine) is is_known, between
 
 
-@pytest.mark.parametrize(
-    ("instructions", "frame"),
-    [
+def test_the_active_user_frame() -> None:
+    for instructions, frame in (
         (["UFRAME_NUM=3", "UTOOL_NUM=2", "L P[1] 10mm/sec FINE"], "3"),
         (["UFRAME_NUM[GP1,2]=4", "UTOOL_NUM=2", "L P[1] 10mm/sec FINE"], "4"),
         (["UTOOL_NUM=2", "UFRAME_NUM=3", "LBL[1]", "CALL X", "L P[1] 10mm/sec FINE", "JMP LBL[1]"], "3"),
@@ -172,13 +168,11 @@ def test_what_came_before_a_move_is_known_or_not(between: str, is_known: bool) -
         (["UTOOL_NUM=2", "UFRAME_NUM=3", "LBL[1]", "L P[1] 10mm/sec FINE", "UFRAME_NUM=4", "JMP LBL[1]"], None),
         (["UTOOL_NUM=2", "UFRAME_NUM=3", "L P[1] 10mm/sec FINE", "UFRAME_NUM=4", "L P[1] 10mm/sec FINE"], None),
         (["UTOOL_NUM=2", "UFRAME_NUM=3", "UFRAME_NUM=4", "PR[1]=P[1]"], None),
-    ],
-)
-def test_the_active_user_frame(instructions: list[str], frame: str | None) -> None:
-    found = FANUC_LS.read([program(instructions, pose(1, head="UF : F, UT : F,\t\tCONFIG : 'N U T, 0, 0, 0',"))])
-    assert [(t.frame, t.tool) for t in found.targets] == ([] if frame is None else [(frame, "2")])
-    assert len(found.skipped) == (frame is None)
-    assert all("active user frame" in entry.reason for entry in found.skipped)
+    ):
+        found = FANUC_LS.read([program(instructions, pose(1, head="UF : F, UT : F,\t\tCONFIG : 'N U T, 0, 0, 0',"))])
+        assert [(t.frame, t.tool) for t in found.targets] == ([] if frame is None else [(frame, "2")]), instructions
+        assert len(found.skipped) == (frame is None), instructions
+        assert all("active user frame" in entry.reason for entry in found.skipped), instructions
 
 
 def test_joints_do_not_depend_on_frames() -> None:
@@ -192,9 +186,8 @@ def test_joints_do_not_depend_on_frames() -> None:
     assert reasons(found) == [(8, "P[1] is in a frame that moves with a conveyor (LINE_TRACK)")]
 
 
-@pytest.mark.parametrize(
-    ("positions", "reason"),
-    [
+def test_positions_that_are_left() -> None:
+    for positions, reason in (
         (pose(1, "\tX =  1.000  mm,\tY =  2.000  mm"), "P[1] has no Z"),
         (pose(1, more=",\n\tX =  1.000  mm"), "P[1] has X twice"),
         (pose(1, more=",\n\tE1=  1.000"), "P[1] has a E1 without mm or deg"),
@@ -206,11 +199,9 @@ def test_joints_do_not_depend_on_frames() -> None:
         (pose(1, head="UF : 1, UT : 1,\t\tCONFIG : 'N F T, 0, 0, 0',"), "P[1] has a CONFIG that cannot be read"),
         (pose(1).replace("GP1", "GP2"), "P[1] has no data of motion group 1"),
         (pose(1, more="\n   GP1:\n\tUF : 1, UT : 1,\n\tJ1= 0.000 deg"), "P[1] has two groups 1"),
-    ],
-)
-def test_positions_that_are_left(positions: str, reason: str) -> None:
-    found = FANUC_LS.read([program([], positions)])
-    assert (found.targets, found.skipped) == ((), (Skipped(0, 5, reason),))
+    ):
+        found = FANUC_LS.read([program([], positions)])
+        assert (found.targets, found.skipped) == ((), (Skipped(0, 5, reason),)), positions
 
 
 def test_a_step_to_any_position_may_be_each_that_no_other_move_names() -> None:
@@ -222,9 +213,8 @@ def test_a_step_to_any_position_may_be_each_that_no_other_move_names() -> None:
 TEXT = program(["J P[1] 10% FINE"], pose(1) + pose(2)).text
 
 
-@pytest.mark.parametrize(
-    ("text", "line", "what"),
-    [
+def test_what_is_refused() -> None:
+    for text, line, what in (
         (TEXT.replace("/PROG", "PROG"), 1, "no section /PROG"),
         (TEXT.replace("/MN", ""), 18, "no section /MN"),
         (TEXT.replace("/END", ""), 18, "no section /END"),
@@ -233,18 +223,15 @@ TEXT = program(["J P[1] 10% FINE"], pose(1) + pose(2)).text
         (TEXT.replace("P[2]{", "Q[2]{"), 12, "no complete position"),
         (TEXT.replace("P[2]{", "P[01]{"), 12, "P[1] appears twice"),
         (TEXT.replace("500.000", "1000001.0"), 9, "out of all proportion"),
-    ],
-)
-def test_what_is_refused(text: str, line: int, what: str) -> None:
-    with pytest.raises(InputError) as refused:
-        FANUC_LS.read([Source(Path("P.LS"), text)])
-    assert what in refused.value.what
-    assert refused.value.where == f"P.LS, line {line}"
+    ):
+        with pytest.raises(InputError) as refused:
+            FANUC_LS.read([Source(Path("P.LS"), text)])
+        assert what in refused.value.what, text
+        assert refused.value.where == f"P.LS, line {line}", text
 
 
-@pytest.mark.parametrize(
-    ("text", "shoulder", "elbow", "ranges"),
-    [
+def test_configurations() -> None:
+    rows: tuple[tuple[str, str | None, str | None, dict[int, tuple[float, float]]], ...] = (
         ("N U T, 0, 0, 0", "front", "up", {1: HALF, 4: HALF, 5: (-pi, 0), 6: HALF}),
         ("FUT,1,-1,0", "front", "up", {1: (pi, 3 * pi), 4: (-3 * pi, -pi), 5: (0, pi), 6: HALF}),
         ("n d t, 0, 0, -2", "front", "down", {1: HALF, 4: HALF, 5: (-pi, 0), 6: (-5 * pi, -3 * pi)}),
@@ -253,15 +240,12 @@ def test_what_is_refused(text: str, line: int, what: str) -> None:
         ("N U T", "front", "up", {5: (-pi, 0)}),
         ("R, 0, 0, 0", None, None, {}),
         ("", None, None, {}),
-    ],
-)
-def test_configurations(
-    text: str, shoulder: str | None, elbow: str | None, ranges: dict[int, tuple[float, float]]
-) -> None:
-    found = configuration(text)
-    assert found is not None
-    assert (found.shoulder, found.elbow, found.wrist, found.near) == (shoulder, elbow, None, None)
-    assert {joint: pytest.approx((low, high)) for joint, low, high in found.ranges} == ranges
+    )
+    for text, shoulder, elbow, ranges in rows:
+        found = configuration(text)
+        assert found is not None, text
+        assert (found.shoulder, found.elbow, found.wrist, found.near) == (shoulder, elbow, None, None), text
+        assert {joint: pytest.approx((low, high)) for joint, low, high in found.ranges} == ranges, text
 
 
 def test_configurations_that_cannot_be_read() -> None:
@@ -280,14 +264,14 @@ SHOWN = [
 ]
 
 
-@pytest.mark.parametrize(("text", "joints"), SHOWN)
-def test_configurations_that_controllers_show(text: str, joints: tuple[float, ...]) -> None:
-    found, other = configuration(text), configuration(text.translate(str.maketrans("NF", "FN")))
-    assert found is not None
-    assert other is not None
-    shown = dict(zip((1, 4, 5, 6), map(radians, joints), strict=True))
-    assert all(low <= shown[joint] < high for joint, low, high in found.ranges)
-    assert not all(low <= shown[joint] < high for joint, low, high in other.ranges)
+def test_configurations_that_controllers_show() -> None:
+    for text, joints in SHOWN:
+        found, other = configuration(text), configuration(text.translate(str.maketrans("NF", "FN")))
+        assert found is not None, text
+        assert other is not None, text
+        shown = dict(zip((1, 4, 5, 6), map(radians, joints), strict=True))
+        assert all(low <= shown[joint] < high for joint, low, high in found.ranges), text
+        assert not all(low <= shown[joint] < high for joint, low, high in other.ranges), text
 
 
 def test_up_stays_up_when_the_arm_leans_back_over_its_first_axis() -> None:
@@ -373,9 +357,8 @@ def test_numbers_of_lines_grow_into_the_blanks_before_them() -> None:
     assert "LINE_COUNT = 19;" in text
 
 
-@pytest.mark.parametrize(
-    ("words", "change"),
-    [
+def test_moves_that_are_left_whole() -> None:
+    for words, change in (
         ("L P[1] 2.5sec FINE", str),
         ("L P[1] R[3]sec CNT100", str),
         ("L P[1] 9mm/sec FINE Wjnt", str),
@@ -389,15 +372,13 @@ def test_numbers_of_lines_grow_into_the_blanks_before_them() -> None:
             "L P[1] 9mm/sec FINE",
             lambda text: text.replace("deg\n}", "deg\n   GP2:\n\tUF : 0, UT : 1,\n\tJ1= 1.000 deg\n}", 1),
         ),
-    ],
-)
-def test_moves_that_are_left_whole(words: str, change: Callable[[str], str]) -> None:
-    source = program([words], pose(1) + pose(2))
-    source = replace(source, text=change(source.text))
-    found = FANUC_LS.read([source])
-    is_circle = found.moves[0].kind == "circular"
-    cut = Split(0, ((LINE, LINE if is_circle else None),), LINE if is_circle else None)
-    assert split(FANUC_LS, found, cut).sources == (source,)
+    ):
+        source = program([words], pose(1) + pose(2))
+        source = replace(source, text=change(source.text))
+        found = FANUC_LS.read([source])
+        is_circle = found.moves[0].kind == "circular"
+        cut = Split(0, ((LINE, LINE if is_circle else None),), LINE if is_circle else None)
+        assert split(FANUC_LS, found, cut).sources == (source,), words
 
 
 def test_tools_and_frames_that_the_program_puts_elsewhere_are_named() -> None:

@@ -150,21 +150,18 @@ def test_three_points_are_a_circle() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("table", "group", "reason"),
-    [
+def test_skipped_positions() -> None:
+    for table, group, reason in (
         ([*PULSES, "C00000=1,2,3,4"], "RB1", "has 4 numbers, 6 are expected"),
         ([*PULSES, "C00000=1,2,3,4,5,6,7"], "RB1", "moves a seventh axis of the arm too"),
         ([*PULSES, "C00000=1,2,3,4,5,6"], "RB1,RB2", "is in a job of two robots, and it is not known whose it is"),
         (["///POSTYPE MTOOL", "C00000=1,2,3,4,5,6"], "RB1", "is in coordinates of the master tool"),
         (["///POSTYPE USER", "C00000=1,2,3,4,5,6"], "RB1", "is in a user frame whose number is not given"),
-    ],
-)
-def test_skipped_positions(table: list[str], group: str, reason: str) -> None:
-    program = JBI.read(job(table, ["MOVJ C00000 VJ=1.00"], group=group))
-    assert program.targets == ()
-    assert program.moves == ()
-    assert [s.reason for s in program.skipped] == [f"C00000 {reason}"]
+    ):
+        program = JBI.read(job(table, ["MOVJ C00000 VJ=1.00"], group=group))
+        assert program.targets == (), table
+        assert program.moves == (), table
+        assert [s.reason for s in program.skipped] == [f"C00000 {reason}"], table
 
 
 def test_a_seventh_number_that_is_zero_is_let_be() -> None:
@@ -196,9 +193,8 @@ def refused(sources: list[Source]) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("table", "count", "what"),
-    [
+def test_malformed_tables_are_refused() -> None:
+    for table, count, what in (
         (["C00000=1,2,3,4,5,6"], None, "a.jbi, line 5: C00000 stands before any ///POSTYPE"),
         ([*PULSES, "C00000=1,2,3,4,5"], 2, "line 4: the job has 1 positions C and says 2"),
         ([*PULSES, "C00000=1,2,3,4,5,6 7"], None, "line 8: a number is missing or malformed"),
@@ -209,10 +205,8 @@ def refused(sources: list[Source]) -> str:
         (["///TOOL one"], None, "line 5: ///TOOL needs a number"),
         ([*PULSES, "1,2,3,4,5,6"], None, "line 8: this is no line of a table of positions"),
         (["///NPOS ,0"], None, "line 5: the number of positions is missing"),
-    ],
-)
-def test_malformed_tables_are_refused(table: list[str], count: int | None, what: str) -> None:
-    assert what in refused(job(table, count=count))
+    ):
+        assert what in refused(job(table, count=count)), table
 
 
 def test_incomplete_jobs_are_refused() -> None:

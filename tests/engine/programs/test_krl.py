@@ -106,24 +106,21 @@ def test_a_milling_program_with_its_own_tool() -> None:
     assert [move.kind for move in program.moves] == ["joint", "linear", "linear", "linear", "circular"]
 
 
-@pytest.mark.parametrize(
-    ("status", "turn", "shoulder", "elbow", "wrist"),
-    [
+def test_status_and_turn() -> None:
+    for status, turn, shoulder, elbow, wrist in (
         ("2", "35", "front", "up", (5, 0.0, pi)),
         ("6", "19", "front", "up", (5, -pi, 0.0)),
         ("0", "0", "front", "down", (5, 0.0, pi)),
         ("3", "0", "back", "down", (5, 0.0, pi)),
         ("1", "0", "back", "up", (5, 0.0, pi)),
         ("'B10110'", "'H32'", "front", "up", (5, -pi, 0.0)),
-    ],
-)
-def test_status_and_turn(status: str, turn: str, shoulder: str, elbow: str, wrist: tuple[int, float, float]) -> None:
-    program = read(f"PTP {{X 1,Y 2,Z 3,A 4,B 5,C 6,S {status},T {turn}}}")
-    configuration = program.targets[0].configuration
-    assert (configuration.shoulder, configuration.elbow, configuration.wrist) == (shoulder, elbow, None)
-    number = {"'H32'": 50}.get(turn) or int(turn)
-    signs = [(i + 1, -inf, 0.0) if number >> i & 1 else (i + 1, 0.0, inf) for i in range(6)]
-    assert configuration.ranges == (wrist, *signs)
+    ):
+        program = read(f"PTP {{X 1,Y 2,Z 3,A 4,B 5,C 6,S {status},T {turn}}}")
+        configuration = program.targets[0].configuration
+        assert (configuration.shoulder, configuration.elbow, configuration.wrist) == (shoulder, elbow, None), status
+        number = {"'H32'": 50}.get(turn) or int(turn)
+        signs = [(i + 1, -inf, 0.0) if number >> i & 1 else (i + 1, 0.0, inf) for i in range(6)]
+        assert configuration.ranges == (wrist, *signs), status
 
 
 def test_status_and_turn_are_for_moves_by_axes() -> None:
@@ -138,9 +135,8 @@ def test_status_and_turn_are_for_moves_by_axes() -> None:
     assert (first.shoulder, first.elbow, first.ranges) == ("front", "up", ((5, 0.0, pi),))
 
 
-@pytest.mark.parametrize(
-    ("body", "tool", "frame"),
-    [
+def test_tool_and_base() -> None:
+    for body, tool, frame in (
         ("", "", ""),
         ("BAS(#TOOL,3)\nBAS ( #BASE , 4 )", "3", "4"),
         ("BAS(#INITMOV,0)", "1", ""),
@@ -150,12 +146,10 @@ def test_status_and_turn_are_for_moves_by_axes() -> None:
         ("BAS(#TOOL,3)\nBAS(#BASE,1)\nSPINDLE()\nBAS(#FRAMES)", "3", "1"),
         ("BAS(#TOOL,3)\nBAS(#BASE,1)\nOTHER()", "8", "1"),
         ("$TOOL=LANCE\n$BASE=$ROBROOT", "LANCE", ""),
-    ],
-)
-def test_tool_and_base(body: str, tool: str, frame: str) -> None:
-    program = read(f"{body}\nLIN {FRAMES}", others="DEF OTHER ( )\nBAS(#TOOL,8)\nEND\n" if "OTHER" in body else "")
-    assert (program.targets[0].tool, program.targets[0].frame) == (tool, frame)
-    assert program.skipped == ()
+    ):
+        program = read(f"{body}\nLIN {FRAMES}", others="DEF OTHER ( )\nBAS(#TOOL,8)\nEND\n" if "OTHER" in body else "")
+        assert (program.targets[0].tool, program.targets[0].frame) == (tool, frame), body
+        assert program.skipped == (), body
 
 
 def test_a_routine_begins_with_what_the_file_set_before() -> None:
@@ -171,9 +165,8 @@ def test_a_declared_frame_may_be_a_tool() -> None:
     assert len(program.targets) == 1
 
 
-@pytest.mark.parametrize(
-    ("body", "reason"),
-    [
+def test_tools_and_bases_that_are_not_known() -> None:
+    for body, reason in (
         ("$TOOL=TOOL_DATA[N]", "the tool is computed"),
         ("$TOOL.X=5", "$TOOL is changed in part"),
         ("$BASE=BASE_DATA[1]:BASE_DATA[2]", "the base is computed"),
@@ -188,12 +181,10 @@ def test_a_declared_frame_may_be_a_tool() -> None:
         ("BASE_DATA[3]=$POS_ACT\n$BASE=BASE_DATA[3]", "the base is computed"),
         ("BASE_DATA[3].X=5\nBAS(#BASE,3)", "the base is computed"),
         ("BAS(#INITMOV,0)\nSETUP()", "SETUP, which is not in this program, may set the tool"),
-    ],
-)
-def test_tools_and_bases_that_are_not_known(body: str, reason: str) -> None:
-    program = read(f"BAS(#TOOL,1)\nBAS(#BASE,1)\n{body}\nLIN {FRAMES}\nPTP {{A1 0,A2 -90,A3 90,A4 0,A5 1,A6 0}}")
-    assert [(s.line, s.reason) for s in program.skipped] == [(body.count("\n") + 5, reason)]
-    assert [move.kind for move in program.moves] == ["joint"]  # axis values need neither
+    ):
+        program = read(f"BAS(#TOOL,1)\nBAS(#BASE,1)\n{body}\nLIN {FRAMES}\nPTP {{A1 0,A2 -90,A3 90,A4 0,A5 1,A6 0}}")
+        assert [(s.line, s.reason) for s in program.skipped] == [(body.count("\n") + 5, reason)], body
+        assert [move.kind for move in program.moves] == ["joint"], body  # axis values need neither
 
 
 def test_a_tool_that_is_set_too_late() -> None:
@@ -202,9 +193,8 @@ def test_a_tool_that_is_set_too_late() -> None:
     assert reasons(read(f"LIN {FRAMES}", others="DEF B ( )\n$BASE=BASE_DATA[1]\nEND\n")) == [(2, late % "base")]
 
 
-@pytest.mark.parametrize(
-    ("body", "data", "reason"),
-    [
+def test_targets_that_cannot_be_corrected() -> None:
+    for body, data, reason in (
         ("LIN XP1", "", "XP1 is not declared in this program"),
         ("LIN XP1", "DECL E6POS XP1", "XP1 is declared without numbers"),
         ("XP1.X=XP1.X+5\nLIN XP1", f"DECL POS XP1={FRAMES}", "XP1 is computed, in line 2"),
@@ -221,12 +211,10 @@ def test_a_tool_that_is_set_too_late() -> None:
         ("LIN P[I]", "DECL POS P[2]", "P[I] is not written out in this program"),
         ("LIN XP1", f"DECL POS XP1={FRAMES}\nXP1={FRAMES}", SEVERAL),
         ("CIRC XP1", f"DECL POS XP1={FRAMES}", "the words of this move are not understood"),
-    ],
-)  # fmt: skip
-def test_targets_that_cannot_be_corrected(body: str, data: str, reason: str) -> None:
-    program = read(body, data)
-    assert reason in [why for _, why in reasons(program)]
-    assert program.moves == ()
+    ):
+        program = read(body, data)
+        assert reason in [why for _, why in reasons(program)], body
+        assert program.moves == (), body
 
 
 def test_one_name_is_listed_once() -> None:
@@ -288,21 +276,26 @@ def test_every_element_of_a_list_has_the_tool_of_its_move() -> None:
     assert program.skipped == ()
 
 
-@pytest.mark.parametrize(
-    "between",
-    ["LOOP", "ELSE", "AGAIN:", "GRIP()", "LIN_REL {X 5}", "PTP XHOME", "LIN {X 5}", "CIRC XP1,XP1,CA 90",
-     "TRIGGER WHEN DISTANCE=1 DELAY=0 DO A=1"],
-)  # fmt: skip
-def test_moves_are_split_only_where_it_is_known_from_where_they_come(between: str) -> None:
-    data = f"DECL POS XP1={FRAMES}"
-    plain = read("PTP XP1\nWAIT SEC 0.5\n$OUT[3]=TRUE\nLIN XP1", data).moves[-1]
-    assert plain.target_text != (0, 0)
-    assert read(f"PTP XP1\n{between}\nLIN XP1", data).moves[-1].target_text == (0, 0)
+def test_moves_are_split_only_where_it_is_known_from_where_they_come() -> None:
+    for between in (
+        "LOOP",
+        "ELSE",
+        "AGAIN:",
+        "GRIP()",
+        "LIN_REL {X 5}",
+        "PTP XHOME",
+        "LIN {X 5}",
+        "CIRC XP1,XP1,CA 90",
+        "TRIGGER WHEN DISTANCE=1 DELAY=0 DO A=1",
+    ):
+        data = f"DECL POS XP1={FRAMES}"
+        plain = read("PTP XP1\nWAIT SEC 0.5\n$OUT[3]=TRUE\nLIN XP1", data).moves[-1]
+        assert plain.target_text != (0, 0), between
+        assert read(f"PTP XP1\n{between}\nLIN XP1", data).moves[-1].target_text == (0, 0), between
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_malformed_text_is_refused() -> None:
+    for text, message in (
         ("DEF A ( )\nLIN {X 1,Y 2\nEND", "curly brackets"),
         ('DEF A ( )\nMsgNotify("half\nEND', "a string does not close"),
         ("DEF A ( )\nDEF B ( )\nEND", "this has no END"),
@@ -311,13 +304,11 @@ def test_moves_are_split_only_where_it_is_known_from_where_they_come(between: st
         ("DEFDAT A\nEND\n", "ends what did not begin"),
         ("PTP XHOME\n", "outside of DEF and END"),
         ("DEF A ( )\nLIN {C 1e999,Y 2,Z 3,A 4,B 5,X 6}\nEND", "out of all proportion"),
-    ],
-)
-def test_malformed_text_is_refused(text: str, message: str) -> None:
-    with pytest.raises(InputError, match=message) as refusal:
-        KRL.read([Source(Path("bad.src"), text)])
-    assert refusal.value.where is not None
-    assert refusal.value.where.startswith("bad.src, line ")
+    ):
+        with pytest.raises(InputError, match=message) as refusal:
+            KRL.read([Source(Path("bad.src"), text)])
+        assert refusal.value.where is not None, text
+        assert refusal.value.where.startswith("bad.src, line "), text
 
 
 def test_a_split_line(cell: Program) -> None:

@@ -66,23 +66,20 @@ def test_a_corrected_program_is_refused_and_an_original_has_no_record(tmp_path: 
         restored([path])
 
 
-@pytest.mark.parametrize(
-    ("comment", "says"),
-    [
+def test_a_comment_that_says_so_is_believed(tmp_path: Path) -> None:
+    for comment, says in (
         (b"! corrected by truearm 0.1.0\r\n", "corrected by truearm 0.1.0"),
         (b"!** corrected by truearm\r\n", "corrected by truearm"),
         (b"! to be corrected by truearm\r\n", None),
         (b"! corrected by truearm on Monday, perhaps\r\n", None),
         (b'TPWrite "corrected by truearm";\r\n', None),
-    ],
-)
-def test_a_comment_that_says_so_is_believed(tmp_path: Path, comment: bytes, says: str | None) -> None:
-    path = write(tmp_path, "m.mod", MODULE.replace(b"ENDMODULE", comment + b"ENDMODULE"))
-    if says is None:
-        assert program_files([path])[0].path == path
-        return
-    with pytest.raises(InputError, match=f"this program was corrected already; got \"the comment '{says}'\""):
-        program_files([path])
+    ):
+        path = write(tmp_path, "m.mod", MODULE.replace(b"ENDMODULE", comment + b"ENDMODULE"))
+        if says is None:
+            assert program_files([path])[0].path == path, comment
+            continue
+        with pytest.raises(InputError, match=f"this program was corrected already; got \"the comment '{says}'\""):
+            program_files([path])
 
 
 def test_a_program_changed_since_is_no_longer_what_its_record_says(tmp_path: Path) -> None:
@@ -111,9 +108,8 @@ def test_a_damaged_record_is_refused(tmp_path: Path) -> None:
             restored([path])
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "said"),
-    [
+def test_what_is_no_program_is_refused(tmp_path: Path) -> None:
+    for name, content, said in (
         ("m.mod", b"", "the file is empty"),
         ("m.mod", b"MODULE m\0\nENDMODULE", "zero bytes.*Export the program as text"),
         ("m.mod", "MODULE m\nENDMODULE".encode("utf-16"), "UTF-16.*Save it as UTF-8"),
@@ -121,11 +117,9 @@ def test_a_damaged_record_is_refused(tmp_path: Path) -> None:
         ("m", MODULE, "no suffix"),
         ("m.ls", MODULE, "called as a program in FANUC LS and is none; got 'what looks like RAPID'"),
         ("m.mod", b"hello world", "called as a program in RAPID and is none"),
-    ],
-)
-def test_what_is_no_program_is_refused(tmp_path: Path, name: str, content: bytes, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read_programs(program_files([write(tmp_path, name, content)]))
+    ):
+        with pytest.raises(InputError, match=said):
+            read_programs(program_files([write(tmp_path, name, content)]))
 
 
 def test_a_program_that_is_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -186,9 +186,8 @@ def test_names_do_not_depend_on_their_case_and_those_of_elsewhere_stay() -> None
     assert [(t.name, t.tool, t.frame) for t in program.targets] == [("p1", "tPen", "wTable"), ("", "", ""), far, far]
 
 
-@pytest.mark.parametrize(
-    ("instruction", "kind"),
-    [
+def test_each_instruction_has_its_arguments_in_its_own_places() -> None:
+    for instruction, kind in (
         ('MoveJSync {},v100,z5,tPen,"act";', "joint"),
         ("MoveLDO {},v100,z5,tPen\\WObj:=wTable,do1,1;", "linear"),
         ("TriggJ {},v100,tr1\\T2:=tr2,z5,tPen;", "joint"),
@@ -199,17 +198,15 @@ def test_names_do_not_depend_on_their_case_and_those_of_elsewhere_stay() -> None
         ("ArcC1 {},{},v100,sm1,wd1\\Weave:=wv1,z1,tPen\\Track:=tr1;", "circular"),
         ("SpotL {},vmax,gun1,spot10,tPen;", "linear"),
         ("DispL \\On,{},v250,bead1,z30,tPen;", "linear"),
-    ],
-)
-def test_each_instruction_has_its_arguments_in_its_own_places(instruction: str, kind: str) -> None:
-    program = read(instruction.replace("{}", pose(7), 1).replace("{}", pose(9)))
-    (move,) = program.moves
-    assert move.kind == kind
-    assert program.targets[move.target].values[0] == (9 if kind == "circular" else 7)
-    assert (move.via is None) == (kind != "circular")
-    assert {t.tool for t in program.targets} == {"tPen"}
-    assert not program.skipped
-    assert not program.unknown
+    ):
+        program = read(instruction.replace("{}", pose(7), 1).replace("{}", pose(9)))
+        (move,) = program.moves
+        assert move.kind == kind, instruction
+        assert program.targets[move.target].values[0] == (9 if kind == "circular" else 7), instruction
+        assert (move.via is None) == (kind != "circular"), instruction
+        assert {t.tool for t in program.targets} == {"tPen"}, instruction
+        assert not program.skipped, instruction
+        assert not program.unknown, instruction
 
 
 P1 = f"CONST robtarget p1:={pose()};"
@@ -220,9 +217,8 @@ TO = f"MoveL {pose()},v1,fine"
 HELD = 'PERS wobjdata wHeld:=[TRUE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
 
 
-@pytest.mark.parametrize(
-    ("body", "data", "line", "part"),
-    [
+def test_what_cannot_be_corrected_is_skipped() -> None:
+    for body, data, line, part in (
         (TO_P1, "", 6, "not declared in this program: p1"),
         ("MoveL *,v1,fine,tPen;", "", 6, "not written in the text"),
         (TO_P1, "CONST jointtarget p1:=[[0,0,0,0,0,0],[0,0,0,0,0,0]];", 6, "is no robtarget: p1"),
@@ -253,14 +249,12 @@ HELD = 'PERS wobjdata wHeld:=[TRUE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0
         (f"MoveAbsJ [[0,0,0],{NO_AXES}],v1,fine,tPen;", "", 6, "missing or computed"),
         (TO_P1, P1.replace("9E+09", "500", 1), 4, "an external axis that is not at zero"),
         (TO_P1, P1.replace("9E+09", "-0.5", 1), 4, "an external axis that is not at zero"),
-    ],
-)
-def test_what_cannot_be_corrected_is_skipped(body: str, data: str, line: int, part: str) -> None:
-    program = read(body, data)
-    skips = [skip for skip in program.skipped if part in skip.reason]
-    assert {skip.line for skip in skips} == {line}, program.skipped
-    moved = {program.targets[move.target].line for move in program.moves}
-    assert not moved or line not in moved or "tool0" in body
+    ):
+        program = read(body, data)
+        skips = [skip for skip in program.skipped if part in skip.reason]
+        assert {skip.line for skip in skips} == {line}, program.skipped
+        moved = {program.targets[move.target].line for move in program.moves}
+        assert not moved or line not in moved or "tool0" in body, body
 
 
 def test_a_target_of_no_move_has_the_only_tool_and_work_object() -> None:
@@ -304,9 +298,8 @@ def test_a_tool_that_the_program_changes_is_not_known() -> None:
 MOVED = "MoveL p1,v1,fine,tPen\\WObj:=wTable;"
 
 
-@pytest.mark.parametrize(
-    ("text", "line", "part"),
-    [
+def test_malformed_text_is_refused() -> None:
+    for text, line, part in (
         ("PROC main()\nENDPROC\n", 1, "there is no MODULE"),
         ("MODULE A\nENDMODULE\nMODULE B\nMODULE C\nENDMODULE\n", 3, "a MODULE has no ENDMODULE"),
         ("MODULE A\nENDMODULE\nENDMODULE\n", 3, "an ENDMODULE closes no MODULE"),
@@ -316,12 +309,10 @@ MOVED = "MoveL p1,v1,fine,tPen\\WObj:=wTable;"
         ("MODULE A\nVAR num x;\nVAR num y:=1];\nENDMODULE\n", 3, "a bracket is not"),
         ("MODULE A\nVAR num y{3}:=[1,(2],3);\nENDMODULE\n", 2, "a bracket is not"),
         ('MODULE A\nVAR string s:="ab"";\nVAR string t:=";\nENDMODULE\n', 2, "a string is not closed"),
-    ],
-)
-def test_malformed_text_is_refused(text: str, line: int, part: str) -> None:
-    with pytest.raises(InputError, match=part) as refused:
-        RAPID.read([Source(Path("bad.mod"), text)])
-    assert refused.value.where == f"bad.mod, line {line}"
+    ):
+        with pytest.raises(InputError, match=part) as refused:
+            RAPID.read([Source(Path("bad.mod"), text)])
+        assert refused.value.where == f"bad.mod, line {line}", text
 
 
 def test_numbers_that_cannot_be_are_refused() -> None:
@@ -411,9 +402,8 @@ def test_offsets_stay_offsets(polish: Program) -> None:
     assert len(again.targets) == len(polish.targets) + 2
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
+def test_moves_that_cannot_be_split_are_left_whole() -> None:
+    for body in (
         f"MoveL {pose()},v1\\T:=5,fine,tPen;",
         f"MoveL {pose()}\\ID:=5,v1,fine,tPen;",
         f"MoveL \\Conc,{pose()},v1,fine,tPen;",
@@ -422,11 +412,9 @@ def test_offsets_stay_offsets(polish: Program) -> None:
         f"ArcLStart {pose()},v1,s1,w1,fine,tPen;",
         f"IF a MoveL {pose()},v1,fine,tPen;",
         f"MoveL Offs({pose()},1,2,3),v1,fine,tPen;",
-    ],
-)
-def test_moves_that_cannot_be_split_are_left_whole(body: str) -> None:
-    program = read(body)
-    (move,) = program.moves
-    assert move.statement == (0, 0)
-    count = len(program.targets[move.target].values)
-    assert split(RAPID, program, between(0, (1.0,) * count)).sources == program.sources
+    ):
+        program = read(body)
+        (move,) = program.moves
+        assert move.statement == (0, 0), body
+        count = len(program.targets[move.target].values)
+        assert split(RAPID, program, between(0, (1.0,) * count)).sources == program.sources, body

@@ -134,9 +134,8 @@ def test_a_pose_that_only_others_stand_on_is_a_frame() -> None:
     assert list(program.frames) == ["corner", "p[0.7, 0, 0, 0, 0, 0]"]
 
 
-@pytest.mark.parametrize(
-    "script",
-    [
+def test_ways_to_say_the_same() -> None:
+    for script in (
         "movel(p[1,2,.3,0,0,0], a=1.2)",
         "movel(a=1.2, pose=p[1,2,.3,0,0,0])",
         "movel( p[ 1 , 2 ,\n .3, # three\n 0,0,0 ] )",
@@ -145,15 +144,13 @@ def test_a_pose_that_only_others_stand_on_is_a_frame() -> None:
         "optimovel(p[1,2,.3,0,0,0], a=0.4, v=0.6)",
         'q = get_inverse_kin(p[1,2,.3,0,0,0], tcp="active_tcp")\nmovel(q)',
         "a = p[1,2,.3,0,0,0]\nb = a\nmovel(b)",
-    ],
-)
-def test_ways_to_say_the_same(script: str) -> None:
-    program = read(TCP + script)
-    assert program.skipped == ()
-    (target,) = program.targets
-    assert target.values == (1, 2, 0.3, 0, 0, 0)
-    assert [word and float(word) for word in written(program, 0)] == [1, 2, 0.3, 0, 0, 0]
-    assert [move.kind for move in program.moves] == ["linear"]
+    ):
+        program = read(TCP + script)
+        assert program.skipped == (), script
+        (target,) = program.targets
+        assert target.values == (1, 2, 0.3, 0, 0, 0), script
+        assert [word and float(word) for word in written(program, 0)] == [1, 2, 0.3, 0, 0, 0], script
+        assert [move.kind for move in program.moves] == ["linear"], script
 
 
 def test_every_assignment_is_a_target_and_the_text_says_which_one_a_move_means() -> None:
@@ -227,9 +224,8 @@ HERE = "p[0,0,0,0,0,1]"
 NOBODY = "wp is assigned, and no move is known to go there"
 
 
-@pytest.mark.parametrize(
-    ("script", "line", "reason"),
-    [
+def test_what_stays_as_it_is() -> None:
+    for script, line, reason in (
         ("movel(Waypoint_9)", 2, "Waypoint_9 is not declared in this program"),
         ("def f(a):\nmovel(a)\nend\nf(p[.1,.2,.3,0,0,0])", 3, "a is an argument of its routine"),
         ("movel(p[d2r(1), 0, 0, 0, 0, 0])", 2, "its numbers are computed"),
@@ -270,10 +266,8 @@ NOBODY = "wp is assigned, and no move is known to go there"
         (f"{A}movel(pose_trans(t, a))\nmovel(pose_trans(a, {HERE}))", 2, "it is a frame of other targets"),
         (f"wp = {HERE}\nmovel(wp)\nwp = get_actual_tcp_pose()\nwp = p[.2,0,0,0,3,0]", 5, NOBODY),
         (f"wp = {HERE}\nmovel(wp)\nset_tcp({HERE})\nmovej([0,0,0,0,0,0])\nwp = p[.2,0,0,0,3,0]", 6, NOBODY),
-    ],
-)
-def test_what_stays_as_it_is(script: str, line: int, reason: str) -> None:
-    assert any(at == line and why.startswith(reason) for at, why in reasons(read(TCP + script)))
+    ):
+        assert any(at == line and why.startswith(reason) for at, why in reasons(read(TCP + script))), script
 
 
 def test_an_offset_of_a_target_that_stays_stays_too() -> None:
@@ -320,9 +314,8 @@ def test_files_are_programs_of_their_own() -> None:
     assert len({m.routine for m in program.moves}) == 2
 
 
-@pytest.mark.parametrize(
-    ("text", "line", "what"),
-    [
+def test_what_is_refused() -> None:
+    for text, line, what in (
         ('def a():\n  textmsg("no end)\nend\n', 2, "string"),
         ("def a():\n  movel(p[.1,.2,.3,0,\n", 2, "not closed"),
         ("def a():\n  while True:\n    movel(p[.1,.2,.3,0,0,0])\nend\n", 1, "this def has no end"),
@@ -333,27 +326,22 @@ def test_files_are_programs_of_their_own() -> None:
         ("\n\nset_tcp(p[0,0,174.25,0,0,0])\na = p[0,0,1742.5,0,0,0]\nmovel(a)", 4, "out of all proportion"),
         ("a = p[0,0,1742.5,0,0,0]\nmovel(pose_trans(a, p[0,0,0,0,0,1]))", 1, "out of all proportion"),
         ("movej(get_inverse_kin(p[.1,.2,.3,0,0,0],[0,9e9,0,0,0,0]))", 1, "out of all proportion"),
-    ],
-)
-def test_what_is_refused(text: str, line: int, what: str) -> None:
-    with pytest.raises(InputError, match=what) as caught:
-        read(text)
-    assert caught.value.where == f"a.script, line {line}"
+    ):
+        with pytest.raises(InputError, match=what) as caught:
+            read(text)
+        assert caught.value.where == f"a.script, line {line}", text
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
+def test_deep_and_round_texts_are_read() -> None:
+    for text in (
         "a = b\nb = a\nmovel(pose_trans(a, p[0,0,0,0,0,1]))",
         "movel(" + "pose_trans(a," * 3000 + "b" + ")" * 3000 + ")",
         "movel(" + "pose_add(" * 3000 + "b" + ",b)" * 3000 + ")",
         "a0 = p[0,0,0,0,0,1]\n" + "".join(f"a{i + 1} = a{i}\n" for i in range(3000)) + "movel(a3000)",
         "movel(p[" + "1" * 20000 + ", 0, 0, 0, 0, x])",
         "end\nend\nmovel",
-    ],
-)
-def test_deep_and_round_texts_are_read(text: str) -> None:
-    assert read(TCP + text).targets == ()
+    ):
+        assert read(TCP + text).targets == (), text[:40]
 
 
 def test_a_line_in_a_frame_is_split_into_calls_with_a_small_blend() -> None:
@@ -397,9 +385,8 @@ def test_named_targets_joints_and_offsets_are_split() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    "move",
-    [
+def test_moves_that_cannot_be_split_stay() -> None:
+    for move in (
         "movej(p[0.2,0,0.3,0,3,0])",
         "movel(p[0.2,0,0.3,0,3,0], t=2)",
         "movel(p[0.2,0,0.3,0,3,0], 1.2, 0.25, time)",
@@ -410,13 +397,11 @@ def test_named_targets_joints_and_offsets_are_split() -> None:
         "b = pose_trans(table, p[0.2,0,0.3,0,3,0])\nmovel(b)",
         "movec(x, p[0.2,0,0.3,0,3,0])",
         "movep(p[0.1,0,0.3,0,3,0], r=0.05)\nmovel(p[0.2,0,0.3,0,3,0])",
-    ],
-)
-def test_moves_that_cannot_be_split_stay(move: str) -> None:
-    program = read(f"{TCP}wide = 0.04\n{move}\n")
-    points = tuple(((x, 0.0, 0.3, 0.0, 3.0, 0.0), None) for x in (0.16, 0.18))
-    last = len(program.moves) - 1
-    assert split(URSCRIPT, program, Split(last, points)).sources == program.sources
+    ):
+        program = read(f"{TCP}wide = 0.04\n{move}\n")
+        points = tuple(((x, 0.0, 0.3, 0.0, 3.0, 0.0), None) for x in (0.16, 0.18))
+        last = len(program.moves) - 1
+        assert split(URSCRIPT, program, Split(last, points)).sources == program.sources, move
 
 
 def test_variables_tell_times_and_radii() -> None:

@@ -186,9 +186,8 @@ def test_points_without_moves_have_the_tool_of_all_moves_and_one_without_father_
     assert [s.reason for s in program.skipped] == ["pC has no frame"]
 
 
-@pytest.mark.parametrize(
-    ("moves", "reason"),
-    [
+def test_skipped_points() -> None:
+    for moves, reason in (
         ("movej(pA,tA,m)\nmovel(pA,flange,m)", "is used with several tools, or by no move where moves have several"),
         ("movej(pA,tA[nI],m)", "is reached with a tool that a variable chooses"),
         ("movej(pA,x_tTool,m)", "is reached with a tool that a variable chooses"),
@@ -197,14 +196,12 @@ def test_points_without_moves_have_the_tool_of_all_moves_and_one_without_father_
         ("movej(pA,tA,m)\nlink(pA,fFrame)", "is changed by the program"),
         ("movej(pA,tA,m)\ncall lib:touch(pA,3)", "is handed to another program"),
         ("movej(pA,tA,m)\n$Xmovej(pA,nTrack,tA,m)", "is handed to another program"),
-    ],
-)
-def test_skipped_points(moves: str, reason: str) -> None:
-    own = '<Parameters><Parameter name="x_tTool" type="tool" /></Parameters>'
-    program = VAL3.read([data(POINT + TOOL), code(moves, own)])
-    assert program.targets == ()
-    assert program.moves == ()
-    assert [s.reason for s in program.skipped if s.source == 0] == [f"pA {reason}"]
+    ):
+        own = '<Parameters><Parameter name="x_tTool" type="tool" /></Parameters>'
+        program = VAL3.read([data(POINT + TOOL), code(moves, own)])
+        assert program.targets == (), moves
+        assert program.moves == (), moves
+        assert [s.reason for s in program.skipped if s.source == 0] == [f"pA {reason}"], moves
 
 
 def test_applications_in_other_folders_have_their_own_names() -> None:
@@ -253,9 +250,8 @@ def test_comments_strings_and_comparisons_change_nothing() -> None:
         assert (len(program.moves), program.unknown) == (1, {})
 
 
-@pytest.mark.parametrize(
-    ("text", "what"),
-    [
+def test_malformed_data_are_refused() -> None:
+    for text, what in (
         (POINT + POINT, "line 6: pA is declared twice in one application"),
         (POINT.replace("/>\n", '/>\n<Value key=" 0 " />\n'), "line 5: pA.0. is given twice"),
         (POINT.replace('"3"', '"three"'), "line 4: z of pA is no number"),
@@ -266,11 +262,9 @@ def test_comments_strings_and_comparisons_change_nothing() -> None:
             variable("fA", "frame", 'x="1" fatherId="fB[0]"') + variable("fB", "frame", 'x="1" fatherId="fA[0]"'),
             "line 4: fA is its own father",
         ),
-    ],
-)
-def test_malformed_data_are_refused(text: str, what: str) -> None:
-    with pytest.raises(InputError, match=f"a.dtx, {what}"):
-        VAL3.read([data(text)])
+    ):
+        with pytest.raises(InputError, match=f"a.dtx, {what}"):
+            VAL3.read([data(text)])
 
 
 def test_other_texts_and_document_types_are_refused() -> None:
@@ -282,19 +276,16 @@ def test_other_texts_and_document_types_are_refused() -> None:
                 VAL3.read([Source(Path("a.dtx"), other)])
 
 
-@pytest.mark.parametrize(
-    ("text", "what"),
-    [
+def test_malformed_code_is_refused() -> None:
+    for text, what in (
         ("movej(pA,tA,m", "line 4: a bracket is not closed"),
         ("\nmovel(pA,{0,0,1},m", "line 5: a bracket is not closed"),
         ("movej(pA,tA)", "line 4: movej has 2 arguments"),
         ("movej(appro(pA,{0,0,2e6,0,0,0}),tA,m)", "line 4: an offset is out of all proportion"),
         ("movej(pA,tA,m)\nend\n// and more\nmovej(pA,tA,m)\n//", "line 8: the code is not complete"),
-    ],
-)
-def test_malformed_code_is_refused(text: str, what: str) -> None:
-    source = code(text)
-    if "complete" in what:
-        source = Source(source.path, source.text.replace("\nend]]>", "]]>"))
-    with pytest.raises(InputError, match=f"start.pgx, {what}"):
-        VAL3.read([source])
+    ):
+        source = code(text)
+        if "complete" in what:
+            source = Source(source.path, source.text.replace("\nend]]>", "]]>"))
+        with pytest.raises(InputError, match=f"start.pgx, {what}"):
+            VAL3.read([source])

@@ -85,22 +85,22 @@ def test_taught_points_stay_byte_for_byte(tmp_path: Path) -> None:
     assert "nothing-corrected" not in codes(again)
 
 
-@pytest.mark.parametrize("offset", ["Offs(p1,120,-80,60)", "RelTool(p1,120,80,-60)"])
-def test_an_offset_from_a_point_that_stays_is_as_long_as_it_says(tmp_path: Path, offset: str) -> None:
+def test_an_offset_from_a_point_that_stays_is_as_long_as_it_says(tmp_path: Path) -> None:
     """The real robot is asked where it is at the point, and 150 mm beside it."""
-    moves = "MoveJ p1,v100,fine,tool0;", f"MoveL {offset},v100,fine,tool0;"
-    path = module(tmp_path, *moves, data=(f"CONST robtarget p1:={pose(400, 100)};",))
-    robot, wanted = worn(), np.linalg.norm([120, 80, 60]) * 1e-3
-    for said in ({"taught": ["points"]}, {"taught": ["none"], "keep": ["p1"]}):
-        made = compensate(robot, [path], **said)  # type: ignore[arg-type]
-        (one,) = made.result.corrections
-        assert one.corrected.tolist() == [False, True]
-        lengths = []
-        for program in (one.program, made.as_written()[0]):
-            tips = matrices(robot, commanded(robot, program))[:, :3, 3]
-            lengths.append(float(np.linalg.norm(tips[1] - tips[0])))
-        assert abs(lengths[0] - wanted) > 5e-5
-        assert lengths[1] == pytest.approx(wanted, abs=2e-6)
+    for offset in ("Offs(p1,120,-80,60)", "RelTool(p1,120,80,-60)"):
+        moves = "MoveJ p1,v100,fine,tool0;", f"MoveL {offset},v100,fine,tool0;"
+        path = module(tmp_path, *moves, data=(f"CONST robtarget p1:={pose(400, 100)};",))
+        robot, wanted = worn(), np.linalg.norm([120, 80, 60]) * 1e-3
+        for said in ({"taught": ["points"]}, {"taught": ["none"], "keep": ["p1"]}):
+            made = compensate(robot, [path], **said)  # type: ignore[arg-type]
+            (one,) = made.result.corrections
+            assert one.corrected.tolist() == [False, True], offset
+            lengths = []
+            for program in (one.program, made.as_written()[0]):
+                tips = matrices(robot, commanded(robot, program))[:, :3, 3]
+                lengths.append(float(np.linalg.norm(tips[1] - tips[0])))
+            assert abs(lengths[0] - wanted) > 5e-5, offset
+            assert lengths[1] == pytest.approx(wanted, abs=2e-6), offset
 
 
 def test_frames_that_were_taught_each_have_a_shift_of_their_own(tmp_path: Path) -> None:

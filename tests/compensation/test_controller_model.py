@@ -65,20 +65,20 @@ def test_the_call_counts_more_than_the_robot_file(tmp_path: Path) -> None:
         compensate(worn("ur10", "nominal"), job, controller_kinematics="unknown")
 
 
-@pytest.mark.parametrize(("robot", "text"), [("ur10", POSES), ("irb120", RAPID)])
-def test_a_model_that_nobody_can_read_is_refused_for_poses(robot: str, text: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="a model that nobody else can read") as refusal:
-        compensate(worn(robot, "proprietary"), [program(tmp_path, text)], controller_kinematics=None)
-    assert "`controller_kinematics=nominal`" in str(refusal.value)
+def test_a_model_that_nobody_can_read_is_refused_for_poses(tmp_path: Path) -> None:
+    for robot, text in (("ur10", POSES), ("irb120", RAPID)):
+        with pytest.raises(InputError, match="a model that nobody else can read") as refusal:
+            compensate(worn(robot, "proprietary"), [program(tmp_path, text)], controller_kinematics=None)
+        assert "`controller_kinematics=nominal`" in str(refusal.value), robot
 
 
-@pytest.mark.parametrize("kinematics", ["proprietary", "unknown"])
-def test_joints_do_not_pass_through_kinematics(kinematics: str, tmp_path: Path) -> None:
-    job = [program(tmp_path, JOINTS)]
-    made = truearm.compensate(worn("ur10", kinematics), job)  # nothing is corrected, so nothing is asked either
-    assert made.files[0].text == job[0].read_bytes()
-    told = compensate(worn("ur10", kinematics), job, controller_kinematics=None, joint_targets="correct")
-    assert told.files[0].corrected == 2
+def test_joints_do_not_pass_through_kinematics(tmp_path: Path) -> None:
+    for kinematics in ("proprietary", "unknown"):
+        job = [program(tmp_path, JOINTS)]
+        made = truearm.compensate(worn("ur10", kinematics), job)  # nothing is corrected, so nothing is asked either
+        assert made.files[0].text == job[0].read_bytes(), kinematics
+        told = compensate(worn("ur10", kinematics), job, controller_kinematics=None, joint_targets="correct")
+        assert told.files[0].corrected == 2, kinematics
 
 
 def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path) -> None:

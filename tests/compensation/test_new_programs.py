@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -73,54 +74,52 @@ def read_again(name: str, program: NewProgram) -> Program:
     return BY_NAME[name].read(sources)
 
 
-@pytest.mark.parametrize("kind", ["joints", "poses"])
-@pytest.mark.parametrize("name", BY_NAME)
-def test_the_own_reader_finds_every_target_again(name: str, kind: str, paths: dict[str, CorrectedPath]) -> None:
-    program = path_program(paths["front-up"], calibrated(), "weld_1", targets=kind, spacing=0.3)  # type: ignore[arg-type]
-    found = read_again(name, program)
-    assert found.skipped == ()
-    assert len(found.targets) == len(found.moves) == len(program)
-    assert [move.target for move in found.moves] == [*range(len(program))]
-    straight = ["joint", *[{"joints": "joint", "poses": "linear"}[kind]] * (len(program) - 1)]
-    assert [move.kind for move in found.moves] == straight
-    for row, target in enumerate(found.targets):
-        form, values = target.form, np.array(target.values)
-        if form.kind == "joints":
-            assert values * form.angle == pytest.approx(program.joints[row], abs=1e-6)
-            continue
-        assert program.poses is not None
-        assert form.orientation is not None
-        assert values[:3] * form.length == pytest.approx(program.poses[row, :3, 3], abs=1e-6)
-        numbers = values[None, 3:] * (1.0 if form.orientation.count == 4 else form.angle)
-        assert form.orientation.matrices(numbers)[0] == pytest.approx(program.poses[row, :3, :3], abs=2e-6)
+def test_the_own_reader_finds_every_target_again(paths: dict[str, CorrectedPath]) -> None:
+    for name, kind in product(BY_NAME, ("joints", "poses")):
+        program = path_program(paths["front-up"], calibrated(), "weld_1", targets=kind, spacing=0.3)  # type: ignore[arg-type]
+        found = read_again(name, program)
+        assert found.skipped == (), (name, kind)
+        assert len(found.targets) == len(found.moves) == len(program), (name, kind)
+        assert [move.target for move in found.moves] == [*range(len(program))], (name, kind)
+        straight = ["joint", *[{"joints": "joint", "poses": "linear"}[kind]] * (len(program) - 1)]
+        assert [move.kind for move in found.moves] == straight, (name, kind)
+        for row, target in enumerate(found.targets):
+            form, values = target.form, np.array(target.values)
+            if form.kind == "joints":
+                assert values * form.angle == pytest.approx(program.joints[row], abs=1e-6), (name, kind)
+                continue
+            assert program.poses is not None, (name, kind)
+            assert form.orientation is not None, (name, kind)
+            assert values[:3] * form.length == pytest.approx(program.poses[row, :3, 3], abs=1e-6), (name, kind)
+            numbers = values[None, 3:] * (1.0 if form.orientation.count == 4 else form.angle)
+            assert form.orientation.matrices(numbers)[0] == pytest.approx(program.poses[row, :3, :3], abs=2e-6), (
+                name,
+                kind,
+            )
 
 
-@pytest.mark.parametrize("posture", POSTURES)
-@pytest.mark.parametrize("name", BY_NAME)
-def test_the_controller_takes_the_posture_that_was_meant(
-    name: str, posture: str, paths: dict[str, CorrectedPath], tmp_path: Path
-) -> None:
-    robot = calibrated()
-    program = path_program(paths[posture], robot, "weld", targets="poses", spacing=0.5)
-    tools = read_tools(robot, cell(tmp_path, CELL))
-    went = commanded(robot, read_again(name, program), Cell(tools, {}))
-    assert robot.controller.from_model(went) == pytest.approx(program.joints, abs=2e-5)
+def test_the_controller_takes_the_posture_that_was_meant(paths: dict[str, CorrectedPath], tmp_path: Path) -> None:
+    for name, posture in product(BY_NAME, POSTURES):
+        robot = calibrated()
+        program = path_program(paths[posture], robot, "weld", targets="poses", spacing=0.5)
+        tools = read_tools(robot, cell(tmp_path, CELL))
+        went = commanded(robot, read_again(name, program), Cell(tools, {}))
+        assert robot.controller.from_model(went) == pytest.approx(program.joints, abs=2e-5), (name, posture)
 
 
-@pytest.mark.parametrize("name", BY_NAME)
-def test_an_arm_of_five_joints_has_programs_of_joint_positions(name: str, tmp_path: Path) -> None:
-    katana = load_robot("katana450")
-    file = tmp_path / "path.yaml"
+def test_an_arm_of_five_joints_has_programs_of_joint_positions(tmp_path: Path) -> None:
+    katana, file = load_robot("katana450"), tmp_path / "path.yaml"
     file.write_text(
         "truearm: truearm-path/1\nunits: {length: mm, angle: deg, time: s}\ntip: [0, 0, 130]\nspeed: 100\n"
         "acceleration: 500\nstep: 0.1\nstart: [0, -370, 210]\nsections:\n  - line: [50, -370, 210]\n"
     )
     program = path_program(correct_path(katana, read_path(file)), katana, "weld", targets="joints", spacing=0.2)
-    found = read_again(name, program)
-    assert len(found.targets) == len(program)
-    for row, target in enumerate(found.targets):
-        assert np.array(target.values)[:5] * target.form.angle == pytest.approx(program.joints[row], abs=1e-6)
-        assert not any(target.values[5:])
+    for name in BY_NAME:
+        found = read_again(name, program)
+        assert len(found.targets) == len(program), name
+        for target, joints in zip(found.targets, program.joints, strict=True):
+            assert np.array(target.values)[:5] * target.form.angle == pytest.approx(joints, abs=1e-6), name
+            assert not any(target.values[5:]), name
 
 
 def test_targets_are_some_time_apart_and_ends_of_sections_are_among_them(paths: dict[str, CorrectedPath]) -> None:
@@ -154,15 +153,15 @@ def test_speed_or_time_stands_in_the_program(paths: dict[str, CorrectedPath]) ->
         assert said in "\n".join(texts(name, program[kind]).values()), (name, kind)
 
 
-@pytest.mark.parametrize("name", BY_NAME)
-def test_a_corrected_program_is_not_corrected_again(name: str, paths: dict[str, CorrectedPath], tmp_path: Path) -> None:
-    program = path_program(paths["front-up"], calibrated(), "weld", targets="joints", spacing=0.5)
-    marked = [(tmp_path / file.name, text) for file, text in texts(name, program).items() if MARK in text]
-    for file, text in marked:
-        file.write_text(text)
-    with pytest.raises(InputError, match="corrected already; got \"the comment 'corrected by truearm"):
-        program_files([file for file, _ in marked])
-    assert MARK not in "".join(texts(name, replace(program, corrected=False)).values())
+def test_a_corrected_program_is_not_corrected_again(paths: dict[str, CorrectedPath], tmp_path: Path) -> None:
+    for name in BY_NAME:
+        program = path_program(paths["front-up"], calibrated(), "weld", targets="joints", spacing=0.5)
+        marked = [(tmp_path / file.name, text) for file, text in texts(name, program).items() if MARK in text]
+        for file, text in marked:
+            file.write_text(text)
+        with pytest.raises(InputError, match="corrected already; got \"the comment 'corrected by truearm"):
+            program_files([file for file, _ in marked])
+        assert MARK not in "".join(texts(name, replace(program, corrected=False)).values()), name
 
 
 def test_what_cannot_be_a_program_is_refused(paths: dict[str, CorrectedPath]) -> None:

@@ -29,24 +29,24 @@ def quadrants(robot: Robot, joints: np.ndarray) -> Configuration:
     return Configuration(elbow=elbow, ranges=bounds)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", ["irb120", "irb1600", "kr5", "lrmate200ic"])
-def test_a_configuration_tells_the_posture_and_the_turn(name: str) -> None:
-    robot = load_robot(name)
-    plain = replace(robot, controller=load_robot("irb120").controller)
-    joints = plain.random_configurations(400, np.random.default_rng(1))
-    meant = resolved_configurations(
-        plain, matrices(plain, joints), [quadrants(plain, q) for q in joints], np.full(joints.shape, np.nan), []
-    )
-    away = meant.joints - joints
-    away[:, 2] -= 2 * math.pi * np.round(away[:, 2] / (2 * math.pi))  # the LR Mate's axis 3 has room for two turns
-    same = np.abs(away).max(axis=1) < 1e-6
-    # Next to an edge of a quadrant another posture may be as good.
-    near_edge = (np.abs((joints[:, [0, 3, 5]] + math.pi / 4) % (math.pi / 2) - math.pi / 4) < 1.01 * ON_EDGE).any(
-        axis=1
-    )
-    assert (same | near_edge).all()
-    assert meant.reachable.all()
-    assert meant.guessed is None
+def test_a_configuration_tells_the_posture_and_the_turn() -> None:
+    for name in ("irb120", "irb1600", "kr5", "lrmate200ic"):
+        robot = load_robot(name)
+        plain = replace(robot, controller=load_robot("irb120").controller)
+        joints = plain.random_configurations(400, np.random.default_rng(1))
+        meant = resolved_configurations(
+            plain, matrices(plain, joints), [quadrants(plain, q) for q in joints], np.full(joints.shape, np.nan), []
+        )
+        away = meant.joints - joints
+        away[:, 2] -= 2 * math.pi * np.round(away[:, 2] / (2 * math.pi))  # the LR Mate's axis 3 has room for two turns
+        same = np.abs(away).max(axis=1) < 1e-6
+        # Next to an edge of a quadrant another posture may be as good.
+        near_edge = (np.abs((joints[:, [0, 3, 5]] + math.pi / 4) % (math.pi / 2) - math.pi / 4) < 1.01 * ON_EDGE).any(
+            axis=1
+        )
+        assert (same | near_edge).all(), name
+        assert meant.reachable.all(), name
+        assert meant.guessed is None, name
 
 
 def test_joints_are_those_that_the_controller_shows() -> None:

@@ -121,6 +121,8 @@ def test_status_and_turn() -> None:
         number = {"'H32'": 50}.get(turn) or int(turn)
         signs = [(i + 1, -inf, 0.0) if number >> i & 1 else (i + 1, 0.0, inf) for i in range(6)]
         assert configuration.ranges == (wrist, *signs), status
+    # These are no bits.
+    assert read("PTP {X 1,Y 2,Z 3,A 4,B 5,C 6,S 'B2',T 2}").targets[0].configuration.shoulder is None
 
 
 def test_status_and_turn_are_for_moves_by_axes() -> None:

@@ -178,7 +178,7 @@ def test_a_file_alone_does_not_know_the_names_of_the_other() -> None:
 
 def test_names_do_not_depend_on_their_case_and_those_of_elsewhere_stay() -> None:
     program = read(
-        f"movej P1,v100,fine,TPEN\\wobj:=WTABLE;\nMoveL {pose()},v100,fine,Tool0\\WObj:=WOBJ0;\n"
+        f"again: movej P1,v100,fine,TPEN\\wobj:=WTABLE;\nMoveL {pose()},v100,fine,Tool0\\WObj:=WOBJ0;\n"
         f"MoveL {pose()},v100,fine,tFar\\WObj:=wFar;\nMoveL {pose()},v100,fine,TFAR\\WObj:=WFAR;",
         f"const Robtarget p1:={pose()};",
     )
@@ -229,6 +229,9 @@ def test_what_cannot_be_corrected_is_skipped() -> None:
         (TO_P1, "CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0]];", 4, "missing or computed"),
         (TO_P1, f"CONST robtarget p1:={pose(rest='[-q,0,0,0],[0,0,0,0],x')};", 4, "has q in place"),
         (f"p1.trans.x:=3; {TO_P1}", PERS_P1, 4, "program runs, in line 6"),
+        (f"IF a p1:=b; {TO_P1}", PERS_P1, 4, "program runs, in line 6"),
+        ("MoveL p1{1},v1,fine,tPen;", ROW.replace("p1{1}", "p1{3}"), 4, "missing or computed"),
+        ("MoveL Offs(p1,1),v1,fine,tPen;", P1, 6, "is computed"),
         (f"Incr p1.trans.x; {TO_P1}", PERS_P1, 4, "while the program runs"),
         ("SearchL d,p1,p1,v1,tPen;", PERS_P1, 4, "while the program runs"),
         (f"{TO},tools{{i}};", "", 6, "a tool that is computed"),
@@ -303,6 +306,7 @@ def test_malformed_text_is_refused() -> None:
         ("PROC main()\nENDPROC\n", 1, "there is no MODULE"),
         ("MODULE A\nENDMODULE\nMODULE B\nMODULE C\nENDMODULE\n", 3, "a MODULE has no ENDMODULE"),
         ("MODULE A\nENDMODULE\nENDMODULE\n", 3, "an ENDMODULE closes no MODULE"),
+        ("MODULE A\nPROC main()\nENDMODULE\n", 2, "a routine has no ENDPROC"),
         ("MODULE A\nPROC main()\nPROC b()\nENDPROC\nENDMODULE\n", 2, "a routine has no ENDPROC"),
         ("MODULE A\nPROC main()\nENDFUNC\nENDMODULE\n", 3, "an ENDFUNC closes nothing"),
         ("MODULE A\nPROC\n", 2, "the head of a PROC is incomplete"),

@@ -236,6 +236,8 @@ def test_what_stays_as_it_is() -> None:
         ("movej(interpolate_pose(a, b, .5))", 2, "it is computed by interpolate_pose"),
         ("movel(pose_trans(get_actual_tcp_pose(), p[0,0,.1,0,0,0]))", 2, "it depends on where the robot is"),
         ("movel(get_inverse_kin(p[.1,.2,.3,0,0,0], tcp=p[0,0,.1,0,0,0]))", 2, "get_inverse_kin has a TCP of its own"),
+        ("movel(get_inverse_kin(x))", 2, "x is not declared in this program"),
+        ("movel(pose_trans(t))", 2, "it is computed"),
         ("movel(pose_trans(t, [0,0,0,0,0,0]))", 2, "joints stand in no frame"),
         (f"movel(pose_trans(t, get_inverse_kin({HERE})))", 2, "joints stand in no frame"),
         (f"movel(pose_trans(t, pose_trans(u, {HERE})))", 2, "its frame stands in another frame"),
@@ -325,6 +327,7 @@ def test_what_is_refused() -> None:
         ("movej([0,0,0,0,0,-1e5])", 1, "out of all proportion"),
         ("\n\nset_tcp(p[0,0,174.25,0,0,0])\na = p[0,0,1742.5,0,0,0]\nmovel(a)", 4, "out of all proportion"),
         ("a = p[0,0,1742.5,0,0,0]\nmovel(pose_trans(a, p[0,0,0,0,0,1]))", 1, "out of all proportion"),
+        ("set_tcp(p[0,0,1742.5,0,0,0])", 1, "out of all proportion"),
         ("movej(get_inverse_kin(p[.1,.2,.3,0,0,0],[0,9e9,0,0,0,0]))", 1, "out of all proportion"),
     ):
         with pytest.raises(InputError, match=what) as caught:

@@ -156,6 +156,7 @@ def test_what_came_before_a_move_is_known_or_not() -> None:
 def test_the_active_user_frame() -> None:
     for instructions, frame in (
         (["UFRAME_NUM=3", "UTOOL_NUM=2", "L P[1] 10mm/sec FINE"], "3"),
+        (["UFRAME_NUM=0", "UTOOL_NUM=2", "L P[1] 10mm/sec FINE"], ""),
         (["UFRAME_NUM[GP1,2]=4", "UTOOL_NUM=2", "L P[1] 10mm/sec FINE"], "4"),
         (["UTOOL_NUM=2", "UFRAME_NUM=3", "LBL[1]", "CALL X", "L P[1] 10mm/sec FINE", "JMP LBL[1]"], "3"),
         (["UTOOL_NUM=2", "UFRAME_NUM=3", "!UFRAME_NUM=4", "LBL[1]", "L P[1] 10mm/sec FINE"], "3"),

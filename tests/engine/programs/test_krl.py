@@ -305,6 +305,7 @@ def test_malformed_text_is_refused() -> None:
         ("DEFDAT A\nDECL INT B=1\n", "this has no ENDDAT"),
         ("DEFDAT A\nEND\n", "ends what did not begin"),
         ("PTP XHOME\n", "outside of DEF and END"),
+        ("DEF A ( )\nLIN {X 1e7,Y 2,Z 3,A 4,B 5,C 6}\nEND", "out of all proportion"),
         ("DEF A ( )\nLIN {C 1e999,Y 2,Z 3,A 4,B 5,X 6}\nEND", "out of all proportion"),
     ):
         with pytest.raises(InputError, match=message) as refusal:

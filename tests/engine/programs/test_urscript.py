@@ -323,6 +323,7 @@ def test_what_is_refused() -> None:
         ("def a():\n  while True:\n    movel(p[.1,.2,.3,0,0,0])\nend\n", 1, "this def has no end"),
         ("def a():\n  movel(p[.1,.2,.3,0,0,0]))\nend\n", 2, "closes no bracket"),
         ("def a():\n  movel(p[.1,.2,.3,0,0,0)]\nend\n", 2, "closes no bracket"),
+        ("movel(p[.1,2000,.3,0,0,0])", 1, "out of all proportion"),
         ("movel(p[.1,1e999,.3,0,0,0])", 1, "out of all proportion"),
         ("movej([0,0,0,0,0,-1e5])", 1, "out of all proportion"),
         ("\n\nset_tcp(p[0,0,174.25,0,0,0])\na = p[0,0,1742.5,0,0,0]\nmovel(a)", 4, "out of all proportion"),

@@ -232,6 +232,7 @@ def test_what_cannot_be_corrected_is_skipped() -> None:
         (f"IF a p1:=b; {TO_P1}", PERS_P1, 4, "program runs, in line 6"),
         ("MoveL p1{1},v1,fine,tPen;", ROW.replace("p1{1}", "p1{3}"), 4, "missing or computed"),
         ("MoveL Offs(p1,1),v1,fine,tPen;", P1, 6, "is computed"),
+        (f"MoveL {'Offs(' * 99}p1{',1,2,3)' * 99},v1,fine,tPen;", P1, 6, "is computed"),
         (f"Incr p1.trans.x; {TO_P1}", PERS_P1, 4, "while the program runs"),
         ("SearchL d,p1,p1,v1,tPen;", PERS_P1, 4, "while the program runs"),
         (f"{TO},tools{{i}};", "", 6, "a tool that is computed"),

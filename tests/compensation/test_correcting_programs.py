@@ -97,7 +97,7 @@ def test_originals_are_restored(program: Path) -> None:
     assert restored.paths == tuple(back / name for name in names)
     assert [path.read_bytes() for path in restored.paths] == [program.read_bytes(), other.read_bytes()]
     with pytest.raises(InputError, match="would be overwritten") as refusal:
-        truearm.revert(corrected, out=out)
+        truearm.revert(corrected[:1], out=corrected[0].parent)
     assert refusal.value.parameter == "out"
     with pytest.raises(InputError, match="no record beside this program") as refusal:
         truearm.revert([program], out=back)

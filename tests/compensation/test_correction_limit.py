@@ -79,10 +79,10 @@ def test_position_and_orientation_count_each_for_itself() -> None:
             checked(moved, turned, accepted)
 
 
-def test_what_is_accepted_is_a_length_and_an_angle() -> None:
+def test_what_is_accepted_is_a_length_and_an_angle(tmp_path: Path) -> None:
     for text in ("yes", "95mm", "95,3", "95mm,3deg,1", "95deg,3mm", "-1mm,3deg", 95.0):
         with pytest.raises(InputError) as refusal:
-            CorrectionLimit.of(text, "accept_correction")
+            truearm.compensate(longer(), [plate(tmp_path)], accept_correction=text, **ANSWERED)  # type: ignore[arg-type]
         assert refusal.value.parameter == "accept_correction", text
 
 

@@ -463,6 +463,11 @@ def test_what_cannot_be_measured_is_refused_before_anything_is_begun(plan: Path,
         assert word in str(refusal.value)
         assert refusal.value.parameter == parameter
         assert not (tmp_path / "out").exists()
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        with pytest.raises(InputError, match=r"another program listens on this port.*which is free") as refusal:
+            truearm.measure(plan, "irb120", out=tmp_path / "out", listen=taken.getsockname()[1], targets=["a"])
+        assert refusal.value.parameter == "listen"
+    assert not (tmp_path / "out" / LOG).exists()
     plan.write_text(MEASURED_PLAN + MEASURED_PLAN.splitlines()[1] + "\n")
     with pytest.raises(InputError, match="appears twice") as refusal:
         arm(plan, tmp_path / "out")

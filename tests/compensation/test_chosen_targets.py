@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.answered import compensate
-from tests.plate import PLATE
+from tests.compensation.workplace import cell, codes, module, plate, pose
 
 import truearm
 from truearm.compensation.program_correction import commanded
@@ -24,8 +24,6 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 
-POSE = "[[{x:.3f},{y:.3f},300],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
-
 
 def worn(effects: tuple[str, ...] = ()) -> Robot:
     """Return an IRB 120 that is another one."""
@@ -34,12 +32,6 @@ def worn(effects: tuple[str, ...] = ()) -> Robot:
     if effects:
         values |= {"compliance_2": 6e-6, "compliance_3": 8e-6}
     return robot.with_values(values)
-
-
-def plate(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
-    path = folder / "plate.mod"
-    path.write_text(PLATE.replace(*change))
-    return path
 
 
 def corrected_lines(made: truearm.ProgramCorrection) -> list[str]:
@@ -82,50 +74,49 @@ def test_taught_points_stay_byte_for_byte(tmp_path: Path) -> None:
     made = compensate(worn(), [program], taught=["points"])
     offsets = {t.name for t in made.result.corrections[0].program.targets if t.parent is not None}
     assert set(corrected_lines(made)) <= offsets
-    alone = tmp_path / "alone.mod"
+    # A program of which all was taught was written with a record, and refused as corrected already when given again.
+    alone, out = tmp_path / "alone.mod", tmp_path / "out"
     alone.write_text("\n".join(line for line in program.read_text().splitlines() if "Offs" not in line))
-    assert compensate(worn(), [alone], taught=["points"]).files[0].text == alone.read_bytes()
+    made = compensate(worn(), [alone], taught=["points"], out=out)
+    assert "Warning (nothing-corrected): Nothing was corrected: the programs are as they were." in made.lines()
+    assert (out / "alone.mod").read_bytes() == made.files[0].text == alone.read_bytes()
+    again = compensate(worn(), [out / "alone.mod"])
+    assert again.files[0].corrected > 10
+    assert "nothing-corrected" not in codes(again)
 
 
-@pytest.mark.parametrize("offset", ["Offs(p1,120,-80,60)", "RelTool(p1,120,80,-60)"])
-@pytest.mark.parametrize("said", [{"taught": ["points"]}, {"taught": ["none"], "keep": ["p1"]}])
-def test_an_offset_from_a_point_that_stays_is_as_long_as_it_says(
-    tmp_path: Path, said: dict[str, list[str]], offset: str
-) -> None:
+def test_an_offset_from_a_point_that_stays_is_as_long_as_it_says(tmp_path: Path) -> None:
     """The real robot is asked where it is at the point, and 150 mm beside it."""
-    path = tmp_path / "m.mod"
-    path.write_text(
-        f"MODULE m\n  CONST robtarget p1:={POSE.format(x=400, y=100)};\n  PROC main()\n"
-        f"    MoveJ p1,v100,fine,tool0;\n    MoveL {offset},v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
-    )
-    robot = worn()
-    made = compensate(robot, [path], **said)  # type: ignore[arg-type]
-    (one,) = made.result.corrections
-    assert one.corrected.tolist() == [False, True]
-    wanted = np.linalg.norm([120, 80, 60]) * 1e-3
-    lengths = []
-    for program in (one.program, made.as_written()[0]):
-        tips = matrices(robot, commanded(robot, program))[:, :3, 3]
-        lengths.append(float(np.linalg.norm(tips[1] - tips[0])))
-    assert abs(lengths[0] - wanted) > 5e-5
-    assert lengths[1] == pytest.approx(wanted, abs=2e-6)
+    for offset in ("Offs(p1,120,-80,60)", "RelTool(p1,120,80,-60)"):
+        moves = "MoveJ p1,v100,fine,tool0;", f"MoveL {offset},v100,fine,tool0;"
+        path = module(tmp_path, *moves, data=(f"CONST robtarget p1:={pose(400, 100)};",))
+        robot, wanted = worn(), np.linalg.norm([120, 80, 60]) * 1e-3
+        for said in ({"taught": ["points"]}, {"taught": ["none"], "keep": ["p1"]}):
+            made = compensate(robot, [path], **said)  # type: ignore[arg-type]
+            (one,) = made.result.corrections
+            assert one.corrected.tolist() == [False, True], offset
+            lengths = []
+            for program in (one.program, made.as_written()[0]):
+                tips = matrices(robot, commanded(robot, program))[:, :3, 3]
+                lengths.append(float(np.linalg.norm(tips[1] - tips[0])))
+            assert abs(lengths[0] - wanted) > 5e-5, offset
+            assert lengths[1] == pytest.approx(wanted, abs=2e-6), offset
 
 
 def test_frames_that_were_taught_each_have_a_shift_of_their_own(tmp_path: Path) -> None:
     """Two plates far apart, each located by its own points: each pattern stays where it was."""
-    lines = ["MODULE m"]
-    for name, (x, y) in {"wLeft": (250, 150), "wRight": (250, -300)}.items():
-        lines.append(f'  PERS wobjdata {name}:=[FALSE,TRUE,"",[[{x},{y},100],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];')
-    lines += ["  PROC main()", "    ConfJ\\Off;"]
-    pose = "[[{x},{y},150],[0,0,1,0],[{q},0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
-    for name, quadrant in (("wLeft", 0), ("wRight", -1)):
-        lines += [
-            f"    MoveJ {pose.format(x=x, y=y, q=quadrant)},v100,fine,tool0\\WObj:={name};"
-            for x in (0, 80, 160)
-            for y in (10, 60, 110)
-        ]
-    path = tmp_path / "m.mod"
-    path.write_text("\n".join([*lines, "  ENDPROC", "ENDMODULE", ""]))
+    plates = {"wLeft": (250, 150, 0), "wRight": (250, -300, -1)}
+    data = (
+        f'PERS wobjdata {name}:=[FALSE,TRUE,"",[[{x},{y},100],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+        for name, (x, y, _) in plates.items()
+    )
+    moves = (
+        f"MoveJ {pose(x, y, 150, f'[0,0,1,0],[{quadrant},0,0,0]')},v100,fine,tool0\\WObj:={name};"
+        for name, (_, _, quadrant) in plates.items()
+        for x in (0, 80, 160)
+        for y in (10, 60, 110)
+    )
+    path = module(tmp_path, "ConfJ\\Off;", *moves, data=tuple(data))
     for taught, apart in ((["none"], True), (["frames"], False)):
         (one,) = compensate(worn(), [path], taught=taught).result.corrections
         assert one.corrected.all()
@@ -137,19 +128,16 @@ def test_frames_that_were_taught_each_have_a_shift_of_their_own(tmp_path: Path) 
 
 def test_what_was_taught_is_asked_and_contradictions_are_refused(tmp_path: Path) -> None:
     program = plate(tmp_path)
-    with pytest.raises(InputError, match="or with what was taught: `taught=points`, `taught=frames`, `taught=tools`"):
-        compensate(worn(), [program], taught=None)
     for wrong, words in (
+        (None, "or with what was taught: `taught=points`, `taught=frames`, `taught=tools`"),
         (["none", "points"], "what was taught is not clear"),
         ([], "what was taught is not clear"),
         (["holes"], "there is no answer of this name"),
     ):
         with pytest.raises(InputError, match=words):
             compensate(worn(), [program], taught=wrong)
-    cell = tmp_path / "cell.yaml"
-    cell.write_text("truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\ntools:\n  tProbe: {of: flange}\n")
     with pytest.raises(InputError, match="the tools cannot be both taught and measured"):
-        compensate(worn(), [program], tools=cell, taught=["tools"])
+        compensate(worn(), [program], tools=cell(tmp_path, "tools:\n  tProbe: {of: flange}\n"), taught=["tools"])
 
 
 def test_the_arm_bends_by_what_the_program_says_that_its_tool_weighs(tmp_path: Path) -> None:
@@ -169,95 +157,67 @@ def test_the_arm_bends_by_what_the_program_says_that_its_tool_weighs(tmp_path: P
     assert replace(said).level == "note"
 
 
-@pytest.mark.parametrize(
-    ("calls", "load"),
-    [
-        ("set_payload(1.5, [0.01, -0.02, 0.05])", Payload(1.5, (0.01, -0.02, 0.05))),
-        ("set_target_payload(m=1.5, cog=[0, 0, 0.05], inertia=[0, 0, 0, 0, 0, 0])", Payload(1.5, (0.0, 0.0, 0.05))),
-        ("set_payload(1.5, [0, 0, 0.05])\n  set_payload(1.5, [0, 0, 0.05])", Payload(1.5, (0.0, 0.0, 0.05))),
-        ("set_payload(1.5, [0, 0, 0.05])\n  set_payload(2.5, [0, 0, 0.05])", None),
-        ("set_payload(1.5)", None),
-        ("set_payload(mass, [0, 0, 0.05])", None),
-        ("set_payload(1e9, [0, 0, 0.05])", None),
-        ("# set_payload(1.5, [0, 0, 0.05])", None),
-    ],
-)
-def test_a_script_that_says_once_what_the_robot_carries(calls: str, load: Payload | None) -> None:
-    text = f"def job():\n  set_tcp(p[0,0,0.1,0,0,0])\n  {calls}\n  movel(p[0.4,0.1,0.3,0,3.14,0])\nend\n"
-    program = URSCRIPT.read([Source(Path("job.script"), text)])
-    assert list(program.loads.values()) == ([load] if load else [])
+def test_a_script_that_says_once_what_the_robot_carries() -> None:
+    carried, low = Payload(1.5, (0.01, -0.02, 0.05)), Payload(1.5, (0.0, 0.0, 0.05))
+    for calls, load in {
+        "set_payload(1.5, [0.01, -0.02, 0.05])": carried,
+        "set_target_payload(m=1.5, cog=[0, 0, 0.05], inertia=[0, 0, 0, 0, 0, 0])": low,
+        "set_payload(1.5, [0, 0, 0.05])\n  set_payload(1.5, [0, 0, 0.05])": low,
+        "set_payload(1.5, [0, 0, 0.05])\n  set_payload(2.5, [0, 0, 0.05])": None,
+        "set_payload(1.5)": None,
+        "set_payload(mass, [0, 0, 0.05])": None,
+        "set_payload(1e9, [0, 0, 0.05])": None,
+        "# set_payload(1.5, [0, 0, 0.05])": None,
+    }.items():
+        text = f"def job():\n  set_tcp(p[0,0,0.1,0,0,0])\n  {calls}\n  movel(p[0.4,0.1,0.3,0,3.14,0])\nend\n"
+        program = URSCRIPT.read([Source(Path("job.script"), text)])
+        assert list(program.loads.values()) == ([load] if load else []), calls
 
 
 def test_a_load_unlike_that_of_the_calibration_is_warned_of(tmp_path: Path) -> None:
-    bare = worn(("compliance",))
-    (said,) = [n for n in compensate(bare, [plate(tmp_path)]).warnings if n.code == "loads-taken"]
+    bare, program = worn(("compliance",)), plate(tmp_path)
+    (said,) = [n for n in compensate(bare, [program]).warnings if n.code == "loads-taken"]
     assert said.level == "warning"
     assert "In its calibration the robot carried 0 kg." in said.message
     robot = bare.with_payload(Payload(2.7, (0.05, 0.025, 0.1)))
-    (said,) = [n for n in compensate(robot, [plate(tmp_path)]).warnings if n.code == "loads-taken"]
-    assert said.level == "note"
+    told = codes(compensate(robot, [program]))
+    assert told["loads-taken"] == "note"
+    assert "load-changes" not in told
+    for line in ("GripLoad lPart;", "tProbe.tload.mass:=6;", "MoveL pHole1,v10,z1,tProbe\\TLoad:=lPart;"):
+        changing = plate(tmp_path, ("PROC main()", f"PROC main()\n    {line}"))
+        assert "load-changes" in codes(compensate(robot, [changing], accept=["skipped"])), line
     grams = plate(tmp_path, ("[2.7,[50,25,100]", "[2700,[50,25,100]"))
-    stiff = compensate(worn(), [grams])
-    assert "payload-unlikely" in {notice.code for notice in stiff.warnings}
-
-
-@pytest.mark.parametrize(
-    "line", ["GripLoad lPart;", "tProbe.tload.mass:=6;", "MoveL pHole1,v10,z1,tProbe\\TLoad:=lPart;"]
-)
-def test_a_program_that_changes_its_load_is_warned_of(tmp_path: Path, line: str) -> None:
-    robot = worn(("compliance",)).with_payload(Payload(2.7, (0.05, 0.025, 0.1)))
-    program = plate(tmp_path, ("PROC main()", f"PROC main()\n    {line}"))
-    assert "load-changes" in {notice.code for notice in compensate(robot, [program], accept=["skipped"]).warnings}
-    assert "load-changes" not in {n.code for n in compensate(robot, [plate(tmp_path)]).warnings}
+    assert "payload-unlikely" in codes(compensate(worn(), [grams]))
 
 
 def test_a_tool_elsewhere_than_the_program_has_it_is_named(tmp_path: Path) -> None:
-    cell = tmp_path / "cell.yaml"
-    text = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
-    text += "tools:\n  tProbe: {of: flange, translation: [X, 0, 125]}\n"
     for x, told in (("9", True), ("1", False)):
-        cell.write_text(text.replace("X", x))
-        made = compensate(worn(), [plate(tmp_path)], tools=cell)
-        assert ("tool-apart" in {notice.code for notice in made.warnings}) == told
+        tools = cell(tmp_path, f"tools:\n  tProbe: {{of: flange, translation: [{x}, 0, 125]}}\n")
+        assert ("tool-apart" in codes(compensate(worn(), [plate(tmp_path)], tools=tools))) == told
 
 
 def test_frames_and_tools_of_targets_that_stay_need_no_place(tmp_path: Path) -> None:
-    program = plate(tmp_path)
-    program.write_text(
-        program.read_text().replace(
-            "  PROC main()",
-            '  PERS wobjdata wOther:=[FALSE,TRUE,"",[[9,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
-            f"  CONST robtarget pFar:={POSE.format(x=300, y=10)};\n  PROC main()\n"
-            "    MoveJ pFar,v100,fine,tProbe\\WObj:=wOther;",
-            1,
-        )
+    other = (
+        '  PERS wobjdata wOther:=[FALSE,TRUE,"",[[9,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+        f"  CONST robtarget pFar:={pose(300, 10)};\n  PROC main()\n"
+        "    MoveJ pFar,v100,fine,tProbe\\WObj:=wOther;"
     )
-    cell = tmp_path / "cell.yaml"
-    cell.write_text(
-        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\nframes:\n"
-        "  wobjPlate: {of: base, translation: [310, -110, 60]}\n"
-    )
+    program = plate(tmp_path, ("  PROC main()", other))
+    place = "frames:\n  wobjPlate: {of: base, translation: [310, -110, 60]}\n"
+    frames = cell(tmp_path, place)
     with pytest.raises(InputError, match="only some of the frames"):
-        compensate(worn(), [program], frames=cell)
-    made = compensate(worn(), [program], frames=cell, keep=["pFar"])
-    assert made.files[0].kept["in `keep`"] == 1
+        compensate(worn(), [program], frames=frames)
+    assert compensate(worn(), [program], frames=frames, keep=["pFar"]).files[0].kept["in `keep`"] == 1
     with pytest.raises(InputError, match="the frames cannot be both taught and measured"):
-        compensate(worn(), [program], frames=cell, taught=["frames"])
-    cell.write_text(cell.read_text().replace("of: base", "of: controller"))
-    assert compensate(worn(), [program], frames=cell, taught=["frames"]).result.frames.frames == "assumed"
-
-
-def test_without_measured_frames_the_error_is_said_to_be_relative(tmp_path: Path) -> None:
-    made = compensate(worn(), [plate(tmp_path)])
-    assert "of all programs together" in made.relative
-    assert made.summary()["expected_is_relative"] is True
-    assert "in each frame" in compensate(worn(), [plate(tmp_path)], taught=["frames"]).relative
+        compensate(worn(), [program], frames=frames, taught=["frames"])
+    frames = cell(tmp_path, place.replace("of: base", "of: controller"))
+    assert compensate(worn(), [program], frames=frames, taught=["frames"]).result.frames.frames == "assumed"
 
 
 def test_a_record_that_is_not_ours_or_holds_the_only_original_is_not_lost(tmp_path: Path) -> None:
     program, out = plate(tmp_path), tmp_path / "out"
-    compensate(worn(), [program], out=out)
-    compensate(worn(), [program], out=out)
+    for _ in range(2):
+        compensate(worn(), [program], out=out)
     (out / "plate.mod").rename(tmp_path / "moved.mod")
     with pytest.raises(InputError, match="holds the original of a program that is not beside it"):
         compensate(worn(), [program], out=out)
@@ -267,72 +227,67 @@ def test_a_record_that_is_not_ours_or_holds_the_only_original_is_not_lost(tmp_pa
     assert (out / "plate.mod.truearm.json").read_text() == "mine"
 
 
-OWN_NAMES = (
-    "MODULE m\n  CONST robtarget a:={a};\n  CONST robtarget b:={b};\n  CONST robtarget c:={c};\n"
-    "  PROC main()\n    MoveL a,v100,fine,tool0\\WObj:=wobj0;\n    MoveL b,v100,fine,tool0;\n"
-    "    MoveL c,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
-)
 #: All was computed, for a controller that computes with the nominal values.
 ANSWERED: Mapping[str, Any] = {"taught": ["none"], "controller_kinematics": "nominal"}
-CELL = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
 
 
-def own_names(folder: Path, more: str = "") -> Path:
-    path = folder / "own.mod"
-    poses = {name: POSE.format(x=x, y=y) for name, x, y in (("a", 300, 10), ("b", 350, 60), ("c", 320, 90))}
-    path.write_text(OWN_NAMES.format(**poses).replace("MODULE m\n", f"MODULE m\n{more}"))
-    return path
-
-
-@pytest.mark.parametrize("declared", [False, True])
-def test_tool0_and_wobj0_are_the_flange_and_the_base(tmp_path: Path, declared: bool) -> None:
-    """They were unknown in a cell file, and in a program that has the module BASE of its controller along."""
-    data = (
-        "PERS tooldata tool0:=[TRUE,[[0,0,0],[1,0,0,0]],[0.001,[0,0,0.001],[1,0,0,0],0,0,0]];\n"
-        'PERS wobjdata wobj0:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+def own_names(folder: Path, data: str = "", more: str = "") -> Path:
+    """Write a program of three targets, in the flange and the base as the controller calls them."""
+    names = {"a": (300, 10), "b": (350, 60), "c": (320, 90)}
+    points = tuple(f"CONST robtarget {name}:={pose(*at)};" for name, at in names.items())
+    return module(
+        folder,
+        "MoveL a,v100,fine,tool0\\WObj:=wobj0;",
+        "MoveL b,v100,fine,tool0;",
+        "MoveL c,v100,fine,tool0;",
+        *filter(None, [more]),
+        data=(*points, *filter(None, [data])),
     )
-    program, cell, texts = own_names(tmp_path, data if declared else ""), tmp_path / "cell.yaml", []
-    for tool, frame in (("tool0", "wobj0"), ("flange", "base"), ("Tool0", "WOBJ0")):
-        cell.write_text(
-            f"{CELL}tools:\n  {tool}: {{of: flange, translation: [0.1, 0, 0]}}\n"
-            f"frames:\n  {frame}: {{of: base, translation: [0, 0.2, 0]}}\n"
-        )
-        made = truearm.compensate(
-            worn(), [program], tools=cell, frames=cell, taught=["none"], controller_kinematics="nominal"
-        )
-        assert made.files[0].corrected == 3
-        assert made.result.frames.tools == made.result.frames.frames == "identified"
-        texts.append(made.files[0].text)
-    assert texts[0] == texts[1] == texts[2] != program.read_bytes()
+
+
+def test_tool0_and_wobj0_are_the_flange_and_the_base(tmp_path: Path) -> None:
+    """They were unknown in a cell file, and in a program that has the module BASE of its controller along."""
+    declared = (
+        "PERS tooldata tool0:=[TRUE,[[0,0,0],[1,0,0,0]],[0.001,[0,0,0.001],[1,0,0,0],0,0,0]];\n"
+        'PERS wobjdata wobj0:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+    )
+    for data in ("", declared):
+        program, texts = own_names(tmp_path, data), set()
+        for tool, frame in (("tool0", "wobj0"), ("flange", "base"), ("Tool0", "WOBJ0")):
+            places = cell(
+                tmp_path,
+                f"tools:\n  {tool}: {{of: flange, translation: [0.1, 0, 0]}}\n"
+                f"frames:\n  {frame}: {{of: base, translation: [0, 0.2, 0]}}\n",
+            )
+            made = truearm.compensate(worn(), [program], tools=places, frames=places, **ANSWERED)
+            assert made.files[0].corrected == 3
+            assert made.result.frames.tools == made.result.frames.frames == "identified"
+            texts.add(made.files[0].text)
+        assert len(texts) == 1
+        assert texts != {program.read_bytes()}
 
 
 def test_a_single_target_is_corrected_where_its_frame_is_known(tmp_path: Path) -> None:
-    program, cell = own_names(tmp_path), tmp_path / "cell.yaml"
-    cell.write_text(f"{CELL}frames:\n  wobj0: {{of: base}}\n")
+    program = own_names(tmp_path)
     alone = truearm.compensate(worn(), [program], only=["a"], **ANSWERED)
     assert alone.lines()[2].startswith("Warning (nothing-corrected): Nothing can be corrected: only one target is left")
     assert "0.000 mm" not in " ".join(alone.lines())
     assert alone.summary()["programs"][0]["expected_mm"] is None
     assert alone.files[0].text == program.read_bytes()
-    known = truearm.compensate(
-        worn(), [program], only=["a"], frames=cell, taught=["none"], controller_kinematics="nominal"
-    )
+    frames = cell(tmp_path, "frames:\n  wobj0: {of: base}\n")
+    known = truearm.compensate(worn(), [program], only=["a"], frames=frames, **ANSWERED)
     assert known.files[0].corrected == 1
     assert known.files[0].largest_shift > 1e-4
-    assert "nothing-corrected" not in {notice.code for notice in known.warnings}
     together = truearm.compensate(worn(), [program], **ANSWERED)
-    assert "nothing-corrected" not in {notice.code for notice in together.warnings}
+    assert not [made for made in (known, together) if "nothing-corrected" in codes(made)]
 
 
 def test_of_frames_that_were_taught_one_with_a_single_target_leaves_it(tmp_path: Path) -> None:
     other = (
         'PERS wobjdata wOther:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
-        f"CONST robtarget d:={POSE.format(x=310, y=20)};\n"
+        f"CONST robtarget d:={pose(310, 20)};"
     )
-    program = own_names(tmp_path, other)
-    program.write_text(
-        program.read_text().replace("  ENDPROC", "    MoveJ d,v100,fine,tool0\\WObj:=wOther;\n  ENDPROC")
-    )
+    program = own_names(tmp_path, other, "MoveJ d,v100,fine,tool0\\WObj:=wOther;")
     apart = truearm.compensate(worn(), [program], taught=["frames"], controller_kinematics="nominal")
     assert corrected_lines(apart) == ["a", "b", "c"]
     assert apart.files[0].kept == {"alone, with `frames` not given": 1}
@@ -340,41 +295,11 @@ def test_of_frames_that_were_taught_one_with_a_single_target_leaves_it(tmp_path:
     assert sorted(corrected_lines(together)) == ["a", "b", "c", "d"]
 
 
-def test_a_program_of_which_all_was_taught_says_so_and_is_still_an_original(tmp_path: Path) -> None:
-    """It was written with a record, and refused as corrected already when somebody gave it again."""
-    program, out = tmp_path / "taught.mod", tmp_path / "out"
-    program.write_text("\n".join(line for line in plate(tmp_path).read_text().splitlines() if "Offs" not in line))
-    made = compensate(worn(), [program], taught=["points"], out=out)
-    assert "Warning (nothing-corrected): Nothing was corrected: the programs are as they were." in made.lines()
-    assert (out / "taught.mod").read_bytes() == program.read_bytes()
-    again = compensate(worn(), [out / "taught.mod"])
-    assert again.files[0].corrected > 10
-    assert "nothing-corrected" not in {notice.code for notice in again.warnings}
-
-
-LS = """\
-/PROG  SEAM
-/MN
-   1:J P[1] 20% FINE    ;
-   2:L P[2:seam] 100mm/sec FINE    ;
-/POS
-P[1]{
-   GP1:
-\tUF : 0, UT : 0,\t\tCONFIG : 'N U T, 0, 0, 0',
-\tX =   400.000  mm,\tY =    20.000  mm,\tZ =   350.000  mm,
-\tW =   180.000 deg,\tP =   -60.000 deg,\tR =   180.000 deg
-};
-P[2:"seam"]{
-   GP1:
-\tUF : 0, UT : 0,\t\tCONFIG : 'N U T, 0, 0, 0',
-\tX =   400.000  mm,\tY =    80.000  mm,\tZ =   330.000  mm,
-\tW =   180.000 deg,\tP =   -60.000 deg,\tR =   180.000 deg
-};
-/END
-"""
-
-
-@pytest.mark.parametrize("name", ["P[2]", "P[2:seam]", "P[2*"])
-def test_a_position_of_fanuc_is_named_with_or_without_its_comment(name: str) -> None:
-    target = FANUC_LS.read([Source(Path("a.ls"), LS)])
-    assert [Patterns([target], [name], "keep").fit(one.name) for one in target.targets] == [False, True]
+def test_a_position_of_fanuc_is_named_with_or_without_its_comment() -> None:
+    text = "/PROG  SEAM\n/MN\n   1:J P[1] 20% FINE    ;\n   2:J P[2:seam] 20% FINE    ;\n/POS\n" + "".join(
+        f"{position}{{\n   GP1:\n\tUF : 0, UT : 0,\n\tJ1=     0.000 deg,\tJ2=   -20.000 deg\n}};\n"
+        for position in ("P[1]", 'P[2:"seam"]')
+    )
+    target = FANUC_LS.read([Source(Path("a.ls"), f"{text}/END\n")])
+    for name in ("P[2]", "P[2:seam]", "P[2*"):
+        assert [Patterns([target], [name], "keep").fit(one.name) for one in target.targets] == [False, True], name

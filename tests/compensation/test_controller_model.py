@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.answered import compensate
+from tests.commanding import Truearm
+from tests.compensation.workplace import cell
 from tests.ur_controller import UR3E_CONF, UR10_CONF
 
 import truearm
 from truearm import InputError, Robot
-from truearm.engine.programs import LANGUAGES
 from truearm.engine.programs.fake_targets import nominal_robot
 from truearm.engine.robot.proof import Proof
 from truearm.engine.robot.robot_file.entries import STATED
@@ -64,20 +65,20 @@ def test_the_call_counts_more_than_the_robot_file(tmp_path: Path) -> None:
         compensate(worn("ur10", "nominal"), job, controller_kinematics="unknown")
 
 
-@pytest.mark.parametrize(("robot", "text"), [("ur10", POSES), ("irb120", RAPID)])
-def test_a_model_that_nobody_can_read_is_refused_for_poses(robot: str, text: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="a model that nobody else can read") as refusal:
-        compensate(worn(robot, "proprietary"), [program(tmp_path, text)], controller_kinematics=None)
-    assert "`controller_kinematics=nominal`" in str(refusal.value)
+def test_a_model_that_nobody_can_read_is_refused_for_poses(tmp_path: Path) -> None:
+    for robot, text in (("ur10", POSES), ("irb120", RAPID)):
+        with pytest.raises(InputError, match="a model that nobody else can read") as refusal:
+            compensate(worn(robot, "proprietary"), [program(tmp_path, text)], controller_kinematics=None)
+        assert "`controller_kinematics=nominal`" in str(refusal.value), robot
 
 
-@pytest.mark.parametrize("kinematics", ["proprietary", "unknown"])
-def test_joints_do_not_pass_through_kinematics(kinematics: str, tmp_path: Path) -> None:
-    job = [program(tmp_path, JOINTS)]
-    made = truearm.compensate(worn("ur10", kinematics), job)  # nothing is corrected, so nothing is asked either
-    assert made.files[0].text == job[0].read_bytes()
-    told = compensate(worn("ur10", kinematics), job, controller_kinematics=None, joint_targets="correct")
-    assert told.files[0].corrected == 2
+def test_joints_do_not_pass_through_kinematics(tmp_path: Path) -> None:
+    for kinematics in ("proprietary", "unknown"):
+        job = [program(tmp_path, JOINTS)]
+        made = truearm.compensate(worn("ur10", kinematics), job)  # nothing is corrected, so nothing is asked either
+        assert made.files[0].text == job[0].read_bytes(), kinematics
+        told = compensate(worn("ur10", kinematics), job, controller_kinematics=None, joint_targets="correct")
+        assert told.files[0].corrected == 2, kinematics
 
 
 def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path) -> None:
@@ -87,20 +88,16 @@ def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path)
         truearm.compensate(worn("irb120"), job, out=out)
     assert refusal.value.parameter == "taught, controller_kinematics"
     for words in (
-        "computed off-line, or taught with this robot?",
         "`taught=none`",
         "(taught: [none])",
         "Does this controller have Absolute Accuracy?",
         "`controller_kinematics=nominal`",
         "(controller_kinematics: nominal)",
-        "(controller: {kinematics: nominal})",
     ):
         assert words in str(refusal.value)
     assert not out.exists()
-    for answered, left in (
-        ({"taught": ["none"]}, "controller_kinematics"),
-        ({"controller_kinematics": "nominal"}, "taught"),
-    ):
+    answers = ({"taught": ["none"]}, "controller_kinematics"), ({"controller_kinematics": "nominal"}, "taught")
+    for answered, left in answers:
         with pytest.raises(InputError) as refusal:
             truearm.compensate(worn("irb120"), job, out=out, **answered)
         assert refusal.value.parameter == left
@@ -109,24 +106,20 @@ def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path)
     assert made.files[0].text == compensate(worn("irb120", "nominal"), job).files[0].text
 
 
-CELL = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
-
-
 def test_a_cell_file_keeps_the_answers(tmp_path: Path) -> None:
-    job, cell, other = [program(tmp_path, RAPID)], tmp_path / "cell.yaml", tmp_path / "other.yaml"
-    cell.write_text(f"{CELL}taught: [none]\ncontroller_kinematics: nominal\n")
+    job = [program(tmp_path, RAPID)]
+    kept = cell(tmp_path, "taught: [none]\ncontroller_kinematics: nominal\n")
     told = compensate(worn("irb120"), job)
-    for kept in (
-        truearm.compensate(worn("irb120"), job, tools=cell),
-        truearm.compensate(worn("irb120"), job, frames=cell),
+    for made in (
+        truearm.compensate(worn("irb120"), job, tools=kept),
+        truearm.compensate(worn("irb120"), job, frames=kept),
     ):
-        assert (kept.files[0].text, kept.applied()["taught"]) == (told.files[0].text, [])
-        assert kept.applied()["controller"] == told.applied()["controller"]
-    assert truearm.compensate(worn("irb120"), job, tools=cell, taught=["points"]).files[0].kept == {"taught": 1}
-    other.write_text(f"{CELL}taught: [points]\n")
+        assert (made.files[0].text, made.applied()["taught"]) == (told.files[0].text, [])
+        assert made.applied()["controller"] == told.applied()["controller"]
+    assert truearm.compensate(worn("irb120"), job, tools=kept, taught=["points"]).files[0].kept == {"taught": 1}
     with pytest.raises(InputError, match="two files answer this differently"):
-        truearm.compensate(worn("irb120"), job, tools=cell, frames=other)
-    other.write_text(f"{CELL}controller_kinematics: proprietary\n")
+        truearm.compensate(worn("irb120"), job, tools=kept, frames=cell(tmp_path, "taught: [points]\n", "b.yaml"))
+    other = cell(tmp_path, "controller_kinematics: proprietary\n", "b.yaml")
     with pytest.raises(InputError, match="that nobody else can read"):
         compensate(worn("irb120"), job, controller_kinematics=None, frames=other)
 
@@ -135,41 +128,35 @@ def test_a_cell_file_names_a_kinematics_file_from_its_own_folder(tmp_path: Path)
     """The file is of another UR10 than this one, which is noticed only if it is read."""
     (tmp_path / "cell").mkdir()
     (tmp_path / "cell" / "calibration.conf").write_text(UR10_CONF)
-    cell = tmp_path / "cell" / "cell.yaml"
-    cell.write_text(f"{CELL}taught: [none]\ncontroller_kinematics: calibration.conf\n")
-    with pytest.raises(InputError, match="not those of this arm"):
-        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], tools=cell)
-    cell.write_text(f"{CELL}taught: [none]\ncontroller_kinematics: calibration.cnf\n")
-    with pytest.raises(InputError, match="no such file") as refusal:
-        truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], tools=cell)
+    for name, said in (("calibration.conf", "not those of this arm"), ("calibration.cnf", "no such file")):
+        answers = cell(tmp_path / "cell", f"taught: [none]\ncontroller_kinematics: {name}\n")
+        with pytest.raises(InputError, match=said) as refusal:
+            truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], tools=answers)
     assert refusal.value.parameter == "tools, frames"
-
-
-def test_every_maker_who_calibrates_is_known() -> None:
-    makers = {one.calibration.maker: one.calibration.always for one in LANGUAGES if one.calibration is not None}
-    assert makers == {"ABB": False, "KUKA": False, "FANUC": False, "Universal Robots": True, "Yaskawa": False}
-
-
-def test_another_robots_file_is_refused_by_its_parameter(tmp_path: Path) -> None:
-    for name, text in (("ur3e.conf", UR3E_CONF), ("short.conf", UR10_CONF[:300])):
-        (tmp_path / name).write_text(text)
-        with pytest.raises(InputError) as refusal:
-            compensate(
-                worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=tmp_path / name, out=tmp_path / "o"
-            )
-        assert refusal.value.parameter == "controller_kinematics"
-        assert not (tmp_path / "o").exists()
 
 
 def test_kinematics_of_another_arm_are_refused_until_they_are_accepted(tmp_path: Path) -> None:
     """What a factory measured of an arm is nearer to what calibration finds of it than the data sheet is."""
-    conf = tmp_path / "other.conf"
-    conf.write_text(UR10_CONF)
-    robot, job = worn("ur10"), [program(tmp_path, POSES)]
-    with pytest.raises(InputError, match=r"not those of this arm: .* the data sheet 1\.00 mm") as refusal:
-        compensate(robot, job, controller_kinematics=conf)
-    assert refusal.value.parameter == "controller_kinematics"
+    robot, job, out = worn("ur10"), [program(tmp_path, POSES)], tmp_path / "out"
+    for text, said in (
+        (UR3E_CONF, "the kinematics of another type of robot"),
+        (UR10_CONF[:300], "six numbers in brackets belong here"),
+        (UR10_CONF, r"not those of this arm: .* the data sheet 1\.00 mm"),
+    ):
+        conf = tmp_path / "other.conf"
+        conf.write_text(text)
+        with pytest.raises(InputError, match=said) as refusal:
+            compensate(robot, job, controller_kinematics=conf, out=out)
+        assert refusal.value.parameter == "controller_kinematics"
+        assert not out.exists()
     assert compensate(robot, job, controller_kinematics=conf, accept=["other-kinematics"]).files
+    # The file of the kinematics is not overwritten.
+    out.mkdir()
+    for name in ("compensation.html", "a.script", "a.script.truearm.json"):
+        conf = conf.rename(out / name)
+        with pytest.raises(InputError, match="overwritten"):
+            compensate(robot, job, controller_kinematics=conf, out=out, accept=["other-kinematics"])
+        assert conf.read_text() == UR10_CONF
 
 
 def test_a_controller_of_a_maker_who_calibrates_every_arm_is_doubted_to_be_nominal(tmp_path: Path) -> None:
@@ -177,41 +164,52 @@ def test_a_controller_of_a_maker_who_calibrates_every_arm_is_doubted_to_be_nomin
     assert "controller-nominal" in {notice.code for notice in made.warnings}
 
 
-@pytest.mark.parametrize("name", ["compensation.html", "a.script", "a.script.truearm.json"])
-def test_the_kinematics_file_is_not_overwritten(name: str, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / name).write_text(UR10_CONF)
-    job, accept = [program(tmp_path, POSES)], ["other-kinematics"]
-    with pytest.raises(InputError, match="overwritten"):
-        compensate(worn("ur10"), job, controller_kinematics=out / name, out=out, accept=accept)
-    assert (out / name).read_text() == UR10_CONF
-
-
 def test_an_imported_robot_is_not_a_calibrated_one(tmp_path: Path) -> None:
     (tmp_path / "calibration.conf").write_text(UR10_CONF)
     imported = truearm.import_ur_kinematics(tmp_path / "calibration.conf", "ur10").robot
     with pytest.raises(InputError, match="not calibrated"):
         nominal_robot(imported)
-    joints = np.zeros((1, 6))
-    assert np.allclose(
-        nominal_robot(imported.with_values({"a_3": -0.6})).forward(joints)[0], imported.forward(joints)[0]
-    )
+    nominal, joints = nominal_robot(imported.with_values({"a_3": -0.6})), np.zeros((1, 6))
+    np.testing.assert_allclose(nominal.forward(joints)[0], imported.forward(joints)[0], rtol=1e-5, atol=1e-8)
+    # A conversion says nothing of the controller any more.
+    assert truearm.convert(imported, "mcpc").robot.controller.kinematics.kind == "unknown"
+    assert truearm.convert(worn("ur10", "nominal"), "mcpc").robot.controller.kinematics.kind == "nominal"
 
 
 def test_saying_what_the_controller_has_does_not_change_what_is_known_of_a_calibration(tmp_path: Path) -> None:
-    robot = sealed(worn("ur10"), Proof("converged", (), (), (), (), (), ()))
-    text = robot_text(robot)
-    (tmp_path / "mine.yaml").write_text(text.replace("controller:\n", "controller:\n  kinematics: nominal\n"))
-    assert is_intact(read_robot(tmp_path / "mine.yaml"))
-    (tmp_path / "mine.yaml").write_text(
-        text.replace("controller:\n", "controller:\n  base: {translation: [1, 0, 0]}\n")
-    )
-    assert not is_intact(read_robot(tmp_path / "mine.yaml"))
+    text = robot_text(sealed(worn("ur10"), Proof("converged", (), (), (), (), (), ())))
+    for entry, intact in (("kinematics: nominal", True), ("base: {translation: [1, 0, 0]}", False)):
+        (tmp_path / "mine.yaml").write_text(text.replace("controller:\n", f"controller:\n  {entry}\n"))
+        assert is_intact(read_robot(tmp_path / "mine.yaml")) is intact
 
 
-def test_a_conversion_says_nothing_of_the_controller_any_more(tmp_path: Path) -> None:
+def test_the_command_names_its_option(truearm: Truearm, tmp_path: Path) -> None:
+    (tmp_path / "worn.yaml").write_text(robot_text(worn("ur10")))
+    answers = ("--taught", "none", "--out", tmp_path / "out")
+    given = ("compensate", tmp_path / "worn.yaml", program(tmp_path, POSES), *answers)
+    refused = truearm(*given)
+    assert refused.code == 2
+    assert "--controller-kinematics nominal" in " ".join(refused.err.split())
     (tmp_path / "calibration.conf").write_text(UR10_CONF)
-    imported = truearm.import_ur_kinematics(tmp_path / "calibration.conf", "ur10").robot
-    assert truearm.convert(imported, "mcpc").robot.controller.kinematics.kind == "unknown"
-    assert truearm.convert(worn("ur10", "nominal"), "mcpc").robot.controller.kinematics.kind == "nominal"
+    other = truearm(*given, "--controller-kinematics", tmp_path / "calibration.conf")
+    assert other.code == 2
+    assert "--accept other-kinematics" in " ".join(other.err.split())
+    accepted = ("--controller-kinematics", tmp_path / "calibration.conf", "--accept", "other-kinematics")
+    assert truearm(*given, *accepted).code == 0
+
+
+def test_the_command_imports(truearm: Truearm, tmp_path: Path) -> None:
+    conf, out = tmp_path / "calibration.conf", tmp_path / "mine.yaml"
+    conf.write_text(UR10_CONF)
+    done = truearm("import", "ur-kinematics", conf, "--robot", "ur10e", "--out", out)
+    assert done.code == 0
+    assert "Warning (type-doubtful): The file is rather of an arm of type ur10." in " ".join(done.out.split())
+    again = truearm("import", "ur-kinematics", conf, "--robot", "ur10", "--out", out)
+    assert again.code == 2  # nothing is overwritten
+    refused = truearm("import", "ur-kinematics", conf, "--robot", "ur5e", "--out", tmp_path / "no.yaml")
+    assert refused.code == 2
+    assert "Of the library, ur10 and ur10e fit." in " ".join(refused.err.split())
+    assert not (tmp_path / "no.yaml").exists()
+    told = truearm("import", "ur-kinematics", conf, "--robot", "ur10", "--out", tmp_path / "b.yaml", "--json")
+    assert '"type-not-told"' in told.out
+    assert '"joint_checksum": "0x6e0f7bf' in told.out

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.answered import compensate
-from tests.plate import PLATE
+from tests.compensation.workplace import cell, codes, plate
 from tests.simulated import campaign
 
 import truearm
@@ -25,6 +24,8 @@ from truearm.engine.programs.corrected_targets import LEDGER
 from truearm.engine.programs.program import MARK
 from truearm.engine.robot.robot_file.writing import robot_text
 
+FAR = ("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]")
+
 
 def calibrated() -> Robot:
     return truearm.load_robot("irb120").with_values({"a_3": 0.2708, "alpha_4": -1.5695, "d_4": 0.3024})
@@ -32,41 +33,41 @@ def calibrated() -> Robot:
 
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
-    path = tmp_path / "plate.mod"
-    path.write_text(PLATE)
+    return plate(tmp_path)
+
+
+def saved(folder: Path, name: str = "robot") -> Path:
+    """Write the robot into a folder of its own, where its ledger is kept."""
+    path = folder / name / "calibrated.yaml"
+    path.parent.mkdir()
+    path.write_text(robot_text(calibrated()))
     return path
 
 
 def test_nothing_is_written_without_a_folder(program: Path) -> None:
     before = program.read_bytes()
     correction = compensate(calibrated(), [program])
-    assert program.read_bytes() == before
-    assert [path.name for path in program.parent.iterdir()] == ["plate.mod"]
+    assert [path.read_bytes() for path in program.parent.iterdir()] == [before]
     (file,) = correction.files
     assert (file.name, file.language, file.targets, file.corrected) == ("plate.mod", "RAPID", 44, 43)
     assert file.text != before
     assert 0.0 < file.mean_shift < file.largest_shift < 3e-3
     assert file.summary()["shift_mm"]["max"] == pytest.approx(1e3 * file.largest_shift)
-    assert [path.name for path in correction.save(program.parent / "out")] == [
-        "plate.mod",
-        "plate.mod.truearm.json",
-        "compensation.html",
-    ]
+    names = ["plate.mod", "plate.mod.truearm.json", "compensation.html"]
+    assert [path.name for path in correction.save(program.parent / "out")] == names
     assert (program.parent / "out" / "plate.mod").read_bytes() == file.text
 
 
 def test_the_call_that_made_it_is_in_the_report(program: Path) -> None:
-    robot = program.parent / "calibrated.yaml"
-    robot.write_text(robot_text(calibrated()))
+    robot = saved(program.parent)
     correction = compensate(robot, [program], payload="1kg,0mm,0mm,50mm", split=1e-5, out=program.parent / "o")
     answers = "taught=['none'], payload='1kg,0mm,0mm,50mm', controller_kinematics='nominal'"
     assert correction.command == f"truearm.compensate('{robot}', ['{program}'], split=1e-05, {answers})"
     assert correction.robot.payload.mass == 1.0
-    page = (program.parent / "o" / "compensation.html").read_text()
-    assert "split=1e-05" in page
     (split,) = correction.splits
     assert split.added > 0
-    assert f"{split.moves} straight or circular moves were split by {split.added} more targets" in page
+    said = f"{split.moves} straight or circular moves were split by {split.added} more targets"
+    assert said in (program.parent / "o" / "compensation.html").read_text()
     assert f"  {split.moves} moves split by {split.added} more targets" in correction.lines()
     assert compensate(calibrated(), [program]).command.startswith(f"truearm.compensate(ROBOT, ['{program}'], ")
 
@@ -82,18 +83,21 @@ def test_what_a_simulated_robot_does_is_said_first(program: Path) -> None:
 
 
 def test_originals_are_restored(program: Path) -> None:
-    out = program.parent / "out"
-    compensate(calibrated(), [program], out=out)
-    restored = truearm.revert([out / "plate.mod"])
+    """Of two programs of one name each from its folder."""
+    other, out, back = plate(program.parent / "two"), program.parent / "out", program.parent / "back"
+    made = compensate(calibrated(), [program, other], out=out)
+    names = [file.name for file in made.files]
+    assert names == [f"{program.parent.name}/plate.mod", "two/plate.mod"]
+    corrected = [out / name for name in names]
+    restored = truearm.revert(corrected[:1])
     assert restored.files[0].original == program.read_bytes()
     assert restored.folder is None
     assert repr(restored) == "plate.mod: as it was before the correction"
-    back = program.parent / "back"
-    restored = truearm.revert([out / "plate.mod"], out=back)
-    assert restored.paths == (back / "plate.mod",)
-    assert (back / "plate.mod").read_bytes() == program.read_bytes()
+    restored = truearm.revert(corrected, out=back)
+    assert restored.paths == tuple(back / name for name in names)
+    assert [path.read_bytes() for path in restored.paths] == [program.read_bytes(), other.read_bytes()]
     with pytest.raises(InputError, match="would be overwritten") as refusal:
-        truearm.revert([out / "plate.mod"], out=out)
+        truearm.revert(corrected[:1], out=corrected[0].parent)
     assert refusal.value.parameter == "out"
     with pytest.raises(InputError, match="no record beside this program") as refusal:
         truearm.revert([program], out=back)
@@ -101,37 +105,18 @@ def test_originals_are_restored(program: Path) -> None:
 
 
 def test_refusals_name_the_parameter(program: Path) -> None:
-    cell = program.parent / "cell.yaml"
-    cell.write_text(
-        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
-        "tools:\n  tElse: {of: flange}\nframes:\n  wobjElse: {of: base}\n"
-    )
-    robot = calibrated()
+    other = cell(program.parent, "tools:\n  tElse: {of: flange}\nframes:\n  wobjElse: {of: base}\n")
     cases: tuple[tuple[dict[str, Any], str, str], ...] = (
         ({"out": program.parent}, "out", "would be overwritten"),
-        ({"tools": cell}, "tools", r"no tool that the programs use is in the file.*or leave out `tools`"),
-        ({"frames": cell}, "frames", r"no frame that the programs use is in the file.*or leave out `frames`"),
+        ({"tools": other}, "tools", r"no tool that the programs use is in the file.*or leave out `tools`"),
+        ({"frames": other}, "frames", r"no frame that the programs use is in the file.*or leave out `frames`"),
         ({"tools": program.parent / "none.yaml"}, "tools", "none.yaml"),
         ({"frames": program.parent / "none.yaml"}, "frames", "none.yaml"),
     )
     for keywords, parameter, said in cases:
         with pytest.raises(InputError, match=said) as refusal:
-            compensate(robot, [program], **keywords)
+            compensate(calibrated(), [program], **keywords)
         assert refusal.value.parameter == parameter
-    with pytest.raises(InputError, match="not calibrated") as refusal:
-        compensate("irb120", [program])
-    assert refusal.value.parameter == "robot"
-    program.write_text(program.read_text().replace("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]"))
-
-
-def test_a_program_that_would_be_moved_in_part_is_refused(program: Path) -> None:
-    robot, out = calibrated(), program.parent / "out"
-    program.write_text(program.read_text().replace("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]"))
-    with pytest.raises(InputError, match=r"3 targets cannot be corrected, .* line 9: out of reach") as refusal:
-        compensate(robot, [program], out=out)
-    assert refusal.value.parameter == "programs"
-    assert not out.exists()
-    assert "line 9: out of reach" in repr(compensate(robot, [program], accept=["skipped"]))
 
 
 def test_what_stays_on_purpose_was_not_skipped(program: Path) -> None:
@@ -143,6 +128,10 @@ def test_what_stays_on_purpose_was_not_skipped(program: Path) -> None:
         compensate(calibrated(), [program])
     (file,) = compensate(calibrated(), [program], keep=["pStart"]).files
     assert file.kept == {"in `keep`": 1, "given by joints": 1}
+    # Offsets from a point that stays and is out of reach stay with it.
+    (file,) = compensate(calibrated(), [plate(program.parent, FAR)], keep=["pHole1"]).files
+    assert file.kept["in `keep`"] == 3
+    assert not file.skipped
 
 
 def test_of_many_skipped_targets_all_are_listed(program: Path) -> None:
@@ -162,98 +151,68 @@ def test_of_many_skipped_targets_all_are_listed(program: Path) -> None:
 
 
 def test_a_corrected_program_without_its_record_is_known_by_its_comment(program: Path) -> None:
+    """In other letters and with other blanks too."""
     out = program.parent / "out"
     compensate(calibrated(), [program], out=out, notes={"date": "2026-02-03"})
-    copy = out / "copy.mod"
-    copy.write_bytes((out / "plate.mod").read_bytes())
     (out / "plate.mod.truearm.json").unlink()
-    for corrected in (out / "plate.mod", copy):
-        with pytest.raises(InputError, match=rf"already; got \"the comment 'corrected by truearm {__version__}'\""):
-            compensate(calibrated(), [corrected])
+    text, copy = (out / "plate.mod").read_text(), out / "copy.mod"
+    with pytest.raises(InputError, match=rf"already; got \"the comment 'corrected by truearm {__version__}'\""):
+        compensate(calibrated(), [out / "plate.mod"])
+    for other in (text, text.upper(), text.replace("corrected by", "Corrected  by")):
+        copy.write_text(other)
+        with pytest.raises(InputError, match="corrected already"):
+            compensate(calibrated(), [copy])
     compensate(calibrated(), [program], out=program.parent / "other")
 
 
-@pytest.mark.parametrize(("noted", "day"), [("2026-02-03", "2026-02-03"), ("Tuesday", str(date.today()))])
-def test_the_comment_says_by_what_and_when(program: Path, noted: str, day: str) -> None:
-    robot = program.parent / "calibrated.yaml"
-    robot.write_text(robot_text(calibrated()))
-    compensate(robot, [program], out=program.parent / "out", notes={"date": noted})
-    lines = (program.parent / "out" / "plate.mod").read_text().splitlines()
-    assert lines[:4] == [
-        "MODULE Plate",
-        f"  ! corrected by truearm {__version__}",
-        f"  ! {day}, calibration {hash_of(robot.read_bytes())[:8]}",
-        "  ! for irb120",
-    ]
-    assert json.loads((program.parent / "out" / "plate.mod.truearm.json").read_text())["date"] == day
-
-
-def test_a_program_in_which_nothing_moves_stays_as_it_is_and_is_none_that_was_corrected(program: Path) -> None:
-    text = program.read_text()
-    moves = "".join(f"    MoveL pHole{k},v20,fine,tProbe\\WObj:=wobjPlate;\n" for k in range(1, 5))
-    program.write_text(text[: text.index("  PROC main()")] + f"  PROC main()\n{moves}  ENDPROC\nENDMODULE\n")
-    out = program.parent / "out"
-    compensate(calibrated(), [program], out=out, keep=["p*"])
-    assert (out / "plate.mod").read_bytes() == program.read_bytes()
-    copy = out / "copy.mod"
-    copy.write_bytes((out / "plate.mod").read_bytes())
-    assert compensate(calibrated(), [copy]).files[0].corrected == 17
+def test_the_comment_says_by_what_and_when(program: Path) -> None:
+    robot = saved(program.parent)
+    for noted, day in (("2026-02-03", "2026-02-03"), ("Tuesday", str(date.today()))):
+        out = program.parent / noted
+        compensate(robot, [program], out=out, notes={"date": noted})
+        assert (out / "plate.mod").read_text().splitlines()[:4] == [
+            "MODULE Plate",
+            f"  ! corrected by truearm {__version__}",
+            f"  ! {day}, calibration {hash_of(robot.read_bytes())[:8]}",
+            "  ! for irb120",
+        ]
+        assert json.loads((out / "plate.mod.truearm.json").read_text())["date"] == day
 
 
 def test_a_ledger_that_cannot_be_written_is_said(program: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = program.parent / "robot" / "calibrated.yaml"
-    robot.parent.mkdir()
-    robot.write_text(robot_text(calibrated()))
+    robot = saved(program.parent)
 
     def refused(folder: Path) -> None:
         if folder == robot.parent:
             raise PermissionError
 
     monkeypatch.setattr(writing, "_try_writing", refused)
-    made = compensate(robot, [program], out=program.parent / "out")
-    said = [(one.code, one.level) for one in made.warnings]
-    assert ("ledger-not-written", "note") in said
+    assert codes(compensate(robot, [program], out=program.parent / "out"))["ledger-not-written"] == "note"
     assert [path.name for path in robot.parent.iterdir()] == ["calibrated.yaml"]
     monkeypatch.undo()
-    made = compensate(robot, [program], out=program.parent / "other")
-    assert "ledger-not-written" not in {one.code for one in made.warnings}
-    assert [path.name for path in sorted(robot.parent.iterdir())] == ["calibrated.yaml", LEDGER]
-    assert "ledger-not-written" not in {one.code for one in compensate(calibrated(), [program]).warnings}
-
-
-def test_a_link_to_a_robot_leads_to_its_ledger(program: Path) -> None:
-    robot = program.parent / "robot" / "calibrated.yaml"
-    robot.parent.mkdir()
-    robot.write_text(robot_text(calibrated()))
+    # A link to a robot leads to its ledger.
     (program.parent / "link.yaml").symlink_to(robot)
-    compensate(program.parent / "link.yaml", [program], out=program.parent / "out")
-    assert (robot.parent / LEDGER).exists()
+    made = compensate(program.parent / "link.yaml", [program], out=program.parent / "other")
+    assert "ledger-not-written" not in codes(made)
+    assert [path.name for path in sorted(robot.parent.iterdir())] == ["calibrated.yaml", LEDGER]
     assert not (program.parent / LEDGER).exists()
+    assert "ledger-not-written" not in codes(compensate(calibrated(), [program]))
 
 
-@pytest.mark.parametrize(
-    "text", ["", "[]", "{", '{"truearm": "truearm-corrections/1", "programs": [{"program": "a"}]}']
-)
-def test_what_has_the_name_of_the_ledger_and_is_none_is_refused(program: Path, text: str) -> None:
-    robot = program.parent / "robot" / "calibrated.yaml"
-    robot.parent.mkdir()
-    robot.write_text(robot_text(calibrated()))
-    (robot.parent / LEDGER).write_text(text)
-    with pytest.raises(InputError, match=f"{LEDGER}: truearm writes a file of this name itself") as refusal:
-        compensate(robot, [program], out=program.parent / "out")
-    assert refusal.value.parameter == "robot"
-    assert (robot.parent / LEDGER).read_text() == text
-    assert not (program.parent / "out").exists()
-    other = program.parent / "other" / "calibrated.yaml"
-    other.parent.mkdir()
-    other.write_bytes(robot.read_bytes())
-    compensate(other, [program], out=program.parent / "out")  # of another folder it is not asked for
+def test_what_has_the_name_of_the_ledger_and_is_none_is_refused(program: Path) -> None:
+    robot, out = saved(program.parent), program.parent / "out"
+    for text in ("", "[]", "{", '{"truearm": "truearm-corrections/1", "programs": [{"program": "a"}]}'):
+        (robot.parent / LEDGER).write_text(text)
+        with pytest.raises(InputError, match=f"{LEDGER}: truearm writes a file of this name itself") as refusal:
+            compensate(robot, [program], out=out)
+        assert refusal.value.parameter == "robot"
+        assert (robot.parent / LEDGER).read_text() == text
+        assert not out.exists()
+    compensate(saved(program.parent, "other"), [program], out=out)  # of another folder it is not asked for
 
 
 def test_the_program_of_a_path_is_remembered(tmp_path: Path) -> None:
-    robot = tmp_path / "robot" / "calibrated.yaml"
-    robot.parent.mkdir()
-    robot.write_text(robot_text(calibrated()))
+    robot = saved(tmp_path)
     file = tmp_path / "path.yaml"
     file.write_text(
         "truearm: truearm-path/1\nunits: {length: mm, angle: deg, time: s}\nspeed: 100\nacceleration: 500\nstep: 0.1\n"
@@ -274,24 +233,8 @@ def test_the_program_of_a_path_is_remembered(tmp_path: Path) -> None:
     assert compensate(robot, [unmarked]).files[0].corrected > 3
 
 
-@pytest.mark.parametrize("change", [str.upper, lambda text: text.replace("corrected by", "Corrected  by")])
-def test_a_comment_is_known_in_other_letters_and_with_other_blanks(program: Path, change: Callable[[str], str]) -> None:
-    compensate(calibrated(), [program], out=program.parent / "out")
-    copy = program.parent / "copy.mod"
-    copy.write_text(change((program.parent / "out" / "plate.mod").read_text()))
-    with pytest.raises(InputError, match="corrected already"):
-        compensate(calibrated(), [copy])
-
-
 def test_what_stays_by_its_name_is_said_not_to_be_in_the_errors(program: Path) -> None:
     robot = truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, 8)[1]).robot
     said = "  Targets that stay because of `keep` or `only` are not in these errors."
     assert said in compensate(robot, [program], keep=["pHole3"]).lines()
     assert said not in compensate(robot, [program]).lines()
-
-
-def test_offsets_from_a_point_that_stays_and_is_out_of_reach_stay_with_it(program: Path) -> None:
-    program.write_text(program.read_text().replace("[[20.0,20.0,0.0]", "[[2000.0,20.0,0.0]"))
-    (file,) = compensate(calibrated(), [program], keep=["pHole1"]).files
-    assert file.kept["in `keep`"] == 3
-    assert not file.skipped

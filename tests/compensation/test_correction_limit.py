@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 import pytest
+from tests.compensation.workplace import cell, codes, module, plate, pose
 from tests.house.examples import PATH
-from tests.plate import PLATE
 
 import truearm
 from truearm.compensation.limit import CorrectionLimit, check_size, correction_limit
@@ -24,7 +24,6 @@ from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY, Transform, rotation_from_vector
 
-HEAD: Final = "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
 #: What must be answered before anything is corrected.
 ANSWERED: Final[Mapping[str, Any]] = {"taught": ["none"], "controller_kinematics": "nominal"}
 LONGER: Final = 0.8e-3
@@ -35,21 +34,10 @@ def longer() -> Robot:
     return load_robot("irb120").with_values({"a_3": 0.27 + LONGER})
 
 
-def plate(folder: Path) -> Path:
-    path = folder / "plate.mod"
-    path.write_text(PLATE)
-    return path
-
-
 def placed(folder: Path, frame: str = "", tool: str = "") -> Path:
     """Write a file with a place of the plate, at (310, -110, 60) mm in the program, and of the probe."""
-    path = folder / "cell.yaml"
-    frames = f"frames:\n  wobjPlate: {{{frame}}}\n" if frame else ""
-    path.write_text(f"{HEAD}{frames}{f'tools:{chr(10)}  tProbe: {{{tool}}}{chr(10)}' if tool else ''}")
-    return path
-
-
-# -- the limit ---------------------------------------------------------------------------------------------
+    frames, tools = f"frames:\n  wobjPlate: {{{frame}}}\n", f"tools:\n  tProbe: {{{tool}}}\n"
+    return cell(folder, (frames if frame else "") + (tools if tool else ""))
 
 
 def test_it_is_twice_the_largest_deviation_of_the_flange() -> None:
@@ -57,6 +45,9 @@ def test_it_is_twice_the_largest_deviation_of_the_flange() -> None:
     assert limit.moved == pytest.approx(2.0 * LONGER, rel=1e-9)
     # 270.8 + 70 + 302 + 72 mm and what is before axis 2: such an angle moves the stretched arm by as much.
     assert 2.0 * LONGER / 1.1 < limit.turned < 2.0 * LONGER / 0.6
+    # Where the instrument stood has no part in it.
+    away = longer().with_frames(Transform((3.0, -1.0, 0.5), (0.5, 0.5, 0.5, 0.5)), {})
+    assert correction_limit(away).moved == pytest.approx(2.0 * LONGER, rel=1e-9)
 
 
 def test_it_is_that_of_the_targets_where_there_are_some() -> None:
@@ -68,49 +59,31 @@ def test_it_is_that_of_the_targets_where_there_are_some() -> None:
     assert limit.turned == pytest.approx(0.02, rel=1e-6)
 
 
-def test_where_the_instrument_stood_has_no_part_in_it() -> None:
-    away = longer().with_frames(Transform((3.0, -1.0, 0.5), (0.5, 0.5, 0.5, 0.5)), {})
-    assert correction_limit(away).moved == pytest.approx(2.0 * LONGER, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("moved", "turned", "accepted", "refused"),
-    [
-        (0.9e-3, 0.9e-3, None, False),
-        (1.1e-3, 0.0, None, True),
-        (0.0, 1.1e-3, None, True),
-        (95e-3, 0.05, "95mm,3deg", False),
-        (95.1e-3, 0.05, "95mm,3deg", True),
-        (95e-3, 0.053, "95mm,3deg", True),
-        (0.9e-3, 0.9e-3, "0.5mm,3deg", True),
-    ],
-)
-def test_position_and_orientation_count_each_for_itself(
-    moved: float, turned: float, accepted: str | None, refused: bool
-) -> None:
-    limit = CorrectionLimit(1e-3, 1e-3)
-    given = None if accepted is None else CorrectionLimit.of(accepted, "accept_correction")
-
-    def checked() -> list[str]:
-        sizes = np.array([0.0, moved]), np.array([0.0, turned])
-        found = check_size(*sizes, limit, given, where=lambda row: f"line {row}", check="Look.", parameter="frames")
+def test_position_and_orientation_count_each_for_itself() -> None:
+    def checked(moved: float, turned: float, accepted: CorrectionLimit | None) -> list[str]:
+        sizes, limit = (np.array([0.0, moved]), np.array([0.0, turned])), CorrectionLimit(1e-3, 1e-3)
+        found = check_size(*sizes, limit, accepted, where=lambda row: f"line {row}", check="Look.", parameter="frames")
         return [notice.code for notice in found]
 
-    if refused:
+    large, small = (CorrectionLimit.of(text, "accept_correction") for text in ("95mm,3deg", "0.5mm,3deg"))
+    assert checked(0.9e-3, 0.9e-3, None) == []
+    assert checked(95e-3, 0.05, large) == ["corrections-large"]
+    for moved, turned, accepted in (
+        (1.1e-3, 0.0, None),
+        (0.0, 1.1e-3, None),
+        (95.1e-3, 0.05, large),
+        (95e-3, 0.053, large),
+        (0.9e-3, 0.9e-3, small),
+    ):
         with pytest.raises(InputError, match=r"^line 1: the correction is larger"):
-            checked()
-    else:
-        assert checked() == ([] if accepted is None else ["corrections-large"])
+            checked(moved, turned, accepted)
 
 
-@pytest.mark.parametrize("text", ["yes", "95mm", "95,3", "95mm,3deg,1", "95deg,3mm", "-1mm,3deg", 95.0])
-def test_what_is_accepted_is_a_length_and_an_angle(text: object, tmp_path: Path) -> None:
-    with pytest.raises(InputError) as refusal:
-        truearm.compensate(longer(), [plate(tmp_path)], accept_correction=text, **ANSWERED)  # type: ignore[arg-type]
-    assert refusal.value.parameter == "accept_correction"
-
-
-# -- programs ----------------------------------------------------------------------------------------------
+def test_what_is_accepted_is_a_length_and_an_angle(tmp_path: Path) -> None:
+    for text in ("yes", "95mm", "95,3", "95mm,3deg,1", "95deg,3mm", "-1mm,3deg", 95.0):
+        with pytest.raises(InputError) as refusal:
+            truearm.compensate(longer(), [plate(tmp_path)], accept_correction=text, **ANSWERED)  # type: ignore[arg-type]
+        assert refusal.value.parameter == "accept_correction", text
 
 
 def test_a_frame_with_a_slip_is_refused_before_anything_is_written(tmp_path: Path) -> None:
@@ -134,19 +107,18 @@ def test_a_frame_with_a_slip_is_refused_before_anything_is_written(tmp_path: Pat
     assert out.exists()
 
 
-def test_an_honest_frame_is_not_refused(tmp_path: Path) -> None:
-    """Half a millimetre and half a degree hundredth beside the CAD: work objects are located so."""
-    cell = placed(tmp_path, "of: base, translation: [310.5, -110, 60], wpr: [0, 0, 0.005]")
-    made = truearm.compensate(longer(), [plate(tmp_path)], frames=cell, **ANSWERED)
-    assert "corrections-large" not in {notice.code for notice in made.warnings}
+def test_an_honest_frame_is_not_refused_and_a_turned_one_is(tmp_path: Path) -> None:
+    """Half a millimetre and half a degree hundredth beside the CAD: work objects are located so.
+
+    Two conventions of angles make a turn; about the middle of the targets it hardly moves them.
+    """
+    frames = placed(tmp_path, "of: base, translation: [310.5, -110, 60], wpr: [0, 0, 0.005]")
+    made = truearm.compensate(longer(), [plate(tmp_path)], frames=frames, **ANSWERED)
+    assert "corrections-large" not in codes(made)
     assert made.files[0].corrected == 43
-
-
-def test_a_turned_frame_is_refused(tmp_path: Path) -> None:
-    """Two conventions of angles make a turn; about the middle of the targets it hardly moves them."""
-    cell = placed(tmp_path, "of: base, translation: [310, -110, 60], wpr: [0, 0, 1]")
+    frames = placed(tmp_path, "of: base, translation: [310, -110, 60], wpr: [0, 0, 1]")
     with pytest.raises(InputError, match=r"and 1\.0\d deg; allowed"):
-        truearm.compensate(longer(), [plate(tmp_path)], frames=cell, accept_correction="50mm,0.9deg", **ANSWERED)
+        truearm.compensate(longer(), [plate(tmp_path)], frames=frames, accept_correction="50mm,0.9deg", **ANSWERED)
 
 
 def probed() -> Robot:
@@ -156,28 +128,23 @@ def probed() -> Robot:
 
 def test_the_target_of_another_tool_is_refused(tmp_path: Path) -> None:
     frame = "of: base, translation: [310, -110, 60]"
-    for target, refused in (("tip", False), ("nest", True)):
-        cell = placed(tmp_path, frame, f"of: flange, target: {target}")
-        given = {"frames": cell, "tools": cell, **ANSWERED}
-        if refused:
-            with pytest.raises(InputError, match="larger than the errors of this robot explain") as refusal:
-                truearm.compensate(probed(), [plate(tmp_path)], **given)
-            assert refusal.value.parameter == "frames, tools"
-        else:
-            assert truearm.compensate(probed(), [plate(tmp_path)], **given).files[0].corrected == 43
+    tip, nest = (placed(tmp_path / name, frame, f"of: flange, target: {name}") for name in ("tip", "nest"))
+    made = truearm.compensate(probed(), [plate(tmp_path)], frames=tip, tools=tip, **ANSWERED)
+    assert made.files[0].corrected == 43
+    with pytest.raises(InputError, match="larger than the errors of this robot explain") as refusal:
+        truearm.compensate(probed(), [plate(tmp_path)], frames=nest, tools=nest, **ANSWERED)
+    assert refusal.value.parameter == "frames, tools"
 
 
 def test_a_target_that_is_turned_otherwise_than_the_tool_is_refused(tmp_path: Path) -> None:
     """Without frames the base takes up a shift, and no turn: a target with an orientation is not the tool's."""
-    program = plate(tmp_path)
     turned = "[0.965926,0,0,0.258819]"  # 30 deg about z
-    program.write_text(program.read_text().replace("[[0,0,125],[1,0,0,0]]", f"[[0,0,125],{turned}]"))
-    assert turned in program.read_text()
-    cell = placed(tmp_path, tool="of: flange, target: tip")
+    program = plate(tmp_path, ("[[0,0,125],[1,0,0,0]]", f"[[0,0,125],{turned}]"))
+    tools = placed(tmp_path, tool="of: flange, target: tip")
     with pytest.raises(InputError, match=r"and 30\.\d\d deg; allowed"):
-        truearm.compensate(probed(), [program], tools=cell, **ANSWERED)
-    cell = placed(tmp_path, tool=f"of: flange, target: tip, quaternion: {turned}")
-    assert truearm.compensate(probed(), [program], tools=cell, **ANSWERED).files[0].corrected == 43
+        truearm.compensate(probed(), [program], tools=tools, **ANSWERED)
+    tools = placed(tmp_path, tool=f"of: flange, target: tip, quaternion: {turned}")
+    assert truearm.compensate(probed(), [program], tools=tools, **ANSWERED).files[0].corrected == 43
 
 
 def springy() -> Robot:
@@ -198,19 +165,14 @@ def test_a_load_makes_no_room_for_itself(tmp_path: Path) -> None:
 
 def test_an_assumed_base_may_turn_targets_farther(tmp_path: Path) -> None:
     """Targets near each other, and near the base: their pattern is turned by more than the arm turns anywhere."""
-    poses = "".join(
-        f"    MoveJ [[{250 + x},{y},{300 + z}],[0.707107,0,0.707107,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],"
-        "v100,fine,tool0;\n"
-        for x, y, z in ((0, 0, 0), (30, 0, 0), (0, 30, 0), (0, 0, 30))
-    )
-    program = tmp_path / "near.mod"
-    program.write_text(f"MODULE m\n  PROC main()\n    ConfJ\\Off;\n{poses}  ENDPROC\nENDMODULE\n")
+    places = ((250, 0, 300), (280, 0, 300), (250, 30, 300), (250, 0, 330))
+    forward = "[0.707107,0,0.707107,0],[0,0,0,0]"
+    moves = (f"MoveJ {pose(*place, forward)},v100,fine,tool0;" for place in places)
+    program = module(tmp_path, "ConfJ\\Off;", *moves)
     (one,) = truearm.compensate(longer(), [program], **ANSWERED).result.corrections
     assert one.corrected.all()
     assert one.turned.max() > 1.4 * correction_limit(longer()).turned
 
-
-# -- places that the controller has otherwise --------------------------------------------------------------
 
 FANUC: Final = Transform((0.42, -0.15, -0.12), (math.cos(math.radians(5)), 0.0, 0.0, math.sin(math.radians(5))))
 #: Where the instrument sees the robot's base.
@@ -238,9 +200,7 @@ def ls_program(folder: Path) -> Path:
 
 
 def fanuc_cell(folder: Path, frame: str, tool: str) -> Path:
-    path = folder / "fanuc.yaml"
-    path.write_text(f'{HEAD}tools:\n  "1": {{{tool}}}\nframes:\n  "1": {{{frame}}}\n')
-    return path
+    return cell(folder, f'tools:\n  "1": {{{tool}}}\nframes:\n  "1": {{{frame}}}\n')
 
 
 def true_frame() -> Array:
@@ -256,57 +216,42 @@ def world_entry() -> str:
 
 
 UFRAME: Final = "controller: {translation: [420, -150, -120], wpr: [0, 0, 10]}"
+UFRAME_READ: Final = "of: controller, translation: [420, -150, -120], wpr: [0, 0, 10]"
 UTOOL: Final = "controller: {translation: [0, 0, 120]}"
 
 
-@pytest.mark.parametrize(
-    ("frame", "tool", "parameter"),
-    [
+def test_a_measured_place_does_not_say_what_the_controller_has(tmp_path: Path) -> None:
+    """It did, and programs were written that missed by 212 mm and by 242 mm on an independent twin."""
+    given, program = f"{world_entry()}, {UFRAME}", ls_program(tmp_path)
+    for frame, tool, parameter in (
         (world_entry(), f"of: flange, target: tip, {UTOOL}", "frames"),
         ("of: base, translation: [420, -150, -120], wpr: [0, 0, 10]", f"of: flange, target: tip, {UTOOL}", "frames"),
-        (f"{world_entry()}, {UFRAME}", "of: flange, target: tip", "tools"),
-        (f"{world_entry()}, {UFRAME}", "of: flange, translation: [0, 0, 120]", "tools"),
-    ],
-)
-def test_a_measured_place_does_not_say_what_the_controller_has(
-    tmp_path: Path, frame: str, tool: str, parameter: str
-) -> None:
-    """It did, and programs were written that missed by 212 mm and by 242 mm on an independent twin."""
-    cell = fanuc_cell(tmp_path, frame, tool)
-    with pytest.raises(InputError, match="nothing says which numbers the controller has") as refusal:
-        truearm.compensate(fanuc(), [ls_program(tmp_path)], tools=cell, frames=cell, out=tmp_path / "out", **ANSWERED)
-    assert refusal.value.parameter == parameter
-    assert "of: controller" in str(refusal.value)
-    assert not (tmp_path / "out").exists()
+        (given, "of: flange, target: tip", "tools"),
+        (given, "of: flange, translation: [0, 0, 120]", "tools"),
+    ):
+        places = fanuc_cell(tmp_path, frame, tool)
+        with pytest.raises(InputError, match="nothing says which numbers the controller has") as refusal:
+            truearm.compensate(fanuc(), [program], tools=places, frames=places, out=tmp_path / "out", **ANSWERED)
+        assert refusal.value.parameter == parameter
+        assert "of: controller" in str(refusal.value)
+        assert not (tmp_path / "out").exists()
 
 
 def test_with_the_numbers_of_the_controller_the_real_robot_goes_there(tmp_path: Path) -> None:
     """The model of the test is the real robot here, so that nothing is left but the digits of the program."""
-    cell, robot = fanuc_cell(tmp_path, f"{world_entry()}, {UFRAME}", f"of: flange, target: tip, {UTOOL}"), fanuc()
-    made = truearm.compensate(robot, [ls_program(tmp_path)], tools=cell, frames=cell, **ANSWERED)
+    places, robot = fanuc_cell(tmp_path, f"{world_entry()}, {UFRAME}", f"of: flange, target: tip, {UTOOL}"), fanuc()
+    made = truearm.compensate(robot, [ls_program(tmp_path)], tools=places, frames=places, **ANSWERED)
     assert made.files[0].corrected == 5
-    known = Cell(read_tools(robot, cell), read_frames(robot, cell))
-    wanted = true_frame() @ made.result.corrections[0].before
-    for program, least, most in (
-        (made.result.corrections[0].program, 0.5e-3, 3e-3),
-        (made.as_written()[0], 0.0, 2e-6),
-    ):
+    known = Cell(read_tools(robot, places), read_frames(robot, places))
+    wanted, (one,) = true_frame() @ made.result.corrections[0].before, made.result.corrections
+    for program, least, most in ((one.program, 0.5e-3, 3e-3), (made.as_written()[0], 0.0, 2e-6)):
         there, _ = robot.forward(commanded(robot, program, known), frame="world", target="tip")
         missed = np.linalg.norm(there - wanted[:, :3, 3], axis=1)
         assert least <= missed.min() <= missed.max() < most
-
-
-def test_what_was_read_on_the_pendant_alone_is_the_controllers(tmp_path: Path) -> None:
-    cell = fanuc_cell(
-        tmp_path,
-        "of: controller, translation: [420, -150, -120], wpr: [0, 0, 10]",
-        "of: controller, translation: [0, 0, 120]",
-    )
-    made = truearm.compensate(fanuc(), [ls_program(tmp_path)], tools=cell, frames=cell, **ANSWERED)
+    # What was read on the pendant alone is the controller's.
+    read = fanuc_cell(tmp_path, UFRAME_READ, "of: controller, translation: [0, 0, 120]")
+    made = truearm.compensate(fanuc(), [ls_program(tmp_path)], tools=read, frames=read, **ANSWERED)
     assert made.result.frames.frames == made.result.frames.tools == "assumed"
-
-
-# -- the common part ---------------------------------------------------------------------------------------
 
 
 def test_a_rigid_motion_is_common_and_leaves_nothing() -> None:
@@ -326,8 +271,8 @@ def test_a_rigid_motion_is_common_and_leaves_nothing() -> None:
 
 def test_the_common_shift_is_told_apart_from_what_remains(tmp_path: Path) -> None:
     """The plate's frame is not turned in the base: its shift is the mean of what its targets move by."""
-    cell = placed(tmp_path, "of: base, translation: [310, -110, 60]")
-    made = truearm.compensate(longer(), [plate(tmp_path)], frames=cell, **ANSWERED)
+    frames = placed(tmp_path, "of: base, translation: [310, -110, 60]")
+    made = truearm.compensate(longer(), [plate(tmp_path)], frames=frames, **ANSWERED)
     (one,) = made.result.corrections
     mean = float(np.linalg.norm((one.after - one.before)[one.corrected, :3, 3].mean(axis=0)))
     told = made.summary()["programs"][0]["shift_mm"]
@@ -339,9 +284,6 @@ def test_the_common_shift_is_told_apart_from_what_remains(tmp_path: Path) -> Non
     # Where the base was assumed, its motion took the common part away.
     assumed = truearm.compensate(longer(), [plate(tmp_path)], **ANSWERED)
     assert not [line for line in assumed.lines() if "common to its targets" in line]
-
-
-# -- paths -------------------------------------------------------------------------------------------------
 
 
 def test_a_path_written_as_a_program_has_the_same_limit(tmp_path: Path) -> None:

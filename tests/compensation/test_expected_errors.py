@@ -24,13 +24,17 @@ from truearm.engine.robot.transform import Transform
 DRAWS = 25
 
 
-def program() -> Program:
-    """Return the plate's program, a tenth of its targets and a posture by joints among them."""
-    text = PLATE
-    lines = [line for line in text.splitlines() if not line.startswith("    Move") or "Circle" in line]
-    jumps = [f"    MoveJ pHole{i},v20,fine,tProbe\\WObj:=wobjPlate;" for i in (1, 6, 8)]
+def program(*moves: str, points: bool = True) -> Program:
+    """Return the plate's program with these moves and, unless it has no points, its circle."""
+    lines = [line for line in PLATE.splitlines() if not line.startswith("    Move") or ("Circle" in line and points)]
+    lines = [line for line in lines if points or "CONST" not in line]
     at = next(i for i, line in enumerate(lines) if "PROC main" in line)
+    jumps = [f"    MoveJ {move},v20,fine,tProbe\\WObj:=wobjPlate;" for move in moves]
     return RAPID.read([Source(Path("plate.mod"), "\n".join([*lines[: at + 1], *jumps, *lines[at + 1 :], ""]))])
+
+
+#: A tenth of its targets and a posture by joints among them.
+SOME = ("pHole1", "pHole6", "pHole8")
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +58,7 @@ def cell_of(robot: Robot, stands: np.ndarray) -> Cell:
 @pytest.mark.parametrize("measured", [True, False])
 def test_robots_drawn_from_the_covariance_miss_as_expected(robot: Robot, measured: bool) -> None:
     """The right correction of such a robot is where the targets should have gone."""
-    proof, one = robot.proof, program()
+    proof, one = robot.proof, program(*SOME)
     assert proof is not None
     stands = robot.base.matrix @ one.frames["wobjPlate"].matrix
     found = corrected(robot, one, cell_of(robot, stands) if measured else Cell({}, {}))
@@ -84,7 +88,7 @@ def corrected(robot: Robot, one: Program, cell: Cell) -> Correction:
 
 
 def test_the_error_of_the_joints_counts(robot: Robot) -> None:
-    proof, one = robot.proof, program()
+    proof, one = robot.proof, program(*SOME)
     assert proof is not None
     shaky = sealed(robot, replace(proof, joint_error=(2e-4,) * 6))
     steady = sealed(robot, replace(proof, joint_error=(0.0,) * 6))
@@ -98,7 +102,7 @@ def test_the_error_of_the_joints_counts(robot: Robot) -> None:
 
 
 def test_what_is_not_known_is_not_said(robot: Robot) -> None:
-    proof, one = robot.proof, program()
+    proof, one = robot.proof, program(*SOME)
     assert proof is not None
     edited = robot.with_values({"a_3": robot.values["a_3"] + 1e-5})
     place = [name for name in proof.names if name.startswith(("base", "target"))]
@@ -115,12 +119,8 @@ def test_what_is_not_known_is_not_said(robot: Robot) -> None:
 
 
 def test_one_target_alone_has_no_correction_of_which_something_could_be_promised(robot: Robot) -> None:
-    text = PLATE
-    lines = [line for line in text.splitlines() if "Move" not in line and "CONST" not in line]
     pose = "[[20,20,0],[-0.069237,-0.008501,0.990128,0.121572],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
-    move = f"    MoveJ {pose},v20,fine,tProbe\\WObj:=wobjPlate;"
-    at = next(i for i, line in enumerate(lines) if "PROC main" in line)
-    one = RAPID.read([Source(Path("m.mod"), "\n".join([*lines[: at + 1], move, *lines[at + 1 :], ""]))])
+    one = program(pose, points=False)
     found = corrected_programs(robot, [one], Cell({}, {})).corrections[0]
     assert found.expected is not None
     assert np.isnan(found.expected.after[0])

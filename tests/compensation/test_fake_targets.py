@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.engine.programs.reading import branches
 
 from truearm.calibration.calibrate import calibrate
 from truearm.engine.base.errors import InputError
@@ -15,7 +16,6 @@ from truearm.engine.programs.fake_targets import fake_targets, matrices, nominal
 from truearm.engine.programs.gauge import best_agreement
 from truearm.engine.programs.program import Configuration
 from truearm.engine.programs.resolved_configurations import resolved_configurations
-from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
@@ -74,32 +74,24 @@ def test_ten_thousand_targets_of_the_measured_irb120(irb120: Robot, request: pyt
     """Every target in the nominal robot's reach: forward of inverse, on the branch asked for or with a cause."""
     count = TARGETS[request.node.callspec.params["irb120"]]
     nominal, rng = nominal_robot(irb120), np.random.default_rng(0)
-    rule = branch_rule(nominal)
-    assert rule is not None
     base, flange = best_agreement(irb120)
     joints = irb120.random_configurations(count * 11 // 10, rng)
-    wanted = np.linalg.inv(_base(irb120)) @ matrices(irb120, joints)
-    asked = rule.numbers(nominal.forward_kinematics(joints))
-    words = [Configuration(*BRANCHES[number].split("-")) for number in asked.tolist()]
+    wanted = np.linalg.inv(irb120.base.matrix) @ matrices(irb120, joints)
+    asked = np.array(branches(nominal, joints))
+    words = [Configuration(*name.split("-")) for name in asked.tolist()]
     unknown = np.full(joints.shape, np.nan)
     meant = resolved_configurations(nominal, np.linalg.inv(base) @ wanted @ flange, words, unknown, range(len(joints)))
     rows = np.flatnonzero(~np.isnan(meant.joints).any(axis=1))[:count]
     assert len(rows) == count
     found = fake_targets(irb120, wanted[rows], meant.joints[rows])
-    there = np.linalg.inv(_base(irb120)) @ matrices(irb120, found.joints)
+    there = np.linalg.inv(irb120.base.matrix) @ matrices(irb120, found.joints)
     assert np.linalg.norm(there[:, :3, 3] - wanted[rows, :3, 3], axis=1).max() < 1e-9
     turned = Rotation.from_matrix(np.swapaxes(there[:, :3, :3], 1, 2) @ wanted[rows, :3, :3]).magnitude()
     assert turned.max() < 1e-8
-    on_branch = rule.numbers(nominal.forward_kinematics(found.joints)) == asked[rows]
+    on_branch = np.array(branches(nominal, found.joints)) == asked[rows]
     assert on_branch.mean() >= 0.9999
     caused = {"beyond-limit", "branch-lost", "unreachable"}
     assert all(found.solutions.status[row].value in caused for row in np.flatnonzero(~on_branch))
-
-
-def _base(robot: Robot) -> np.ndarray:
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = robot.base.rotation, robot.base.translation
-    return made
 
 
 def test_the_nominal_robot_is_the_table_however_often_it_was_calibrated() -> None:
@@ -112,11 +104,10 @@ def test_the_nominal_robot_is_the_table_however_often_it_was_calibrated() -> Non
 
 
 def test_a_robot_that_is_not_calibrated_is_refused() -> None:
-    with pytest.raises(InputError, match=r"this robot is not calibrated.*calibrated.yaml"):
-        nominal_robot(load_robot("irb120"))
-    standing = load_robot("irb120").with_values({"base_x": 1.0})
-    with pytest.raises(InputError, match="not calibrated"):
-        nominal_robot(standing)
+    nominal = load_robot("irb120")
+    for robot in (nominal, nominal.with_values({"base_x": 1.0})):
+        with pytest.raises(InputError, match=r"this robot is not calibrated.*calibrated.yaml"):
+            nominal_robot(robot)
 
 
 def test_an_arm_of_seven_joints_stays_near_to_what_was_meant() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.compensation.workplace import cell
 
 from truearm.compensation.corrected_path import CorrectedPath, correct_path, path_program
 from truearm.compensation.program_correction import commanded
@@ -33,10 +35,7 @@ sections:
   - line: [350, 100, 250]
   - {circle: [[400, 150, 250], [350, 200, 250]], speed: 50}
 """
-CELL = (
-    "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
-    'tools: {"0": {of: flange, controller: {}}, tcp: {of: flange, controller: {}}}\n'
-)
+CELL = 'tools: {"0": {of: flange, controller: {}}, tcp: {of: flange, controller: {}}}\n'
 POSTURES = {
     "front-up": [0.0, 10.0, 10.0, 0.0, 60.0, 0.0],
     "turned": [0.0, 10.0, 10.0, 150.0, -60.0, -150.0],
@@ -62,65 +61,65 @@ def paths(tmp_path_factory: pytest.TempPathFactory) -> dict[str, CorrectedPath]:
     return {name: correct_path(calibrated(), read_path(file), np.radians(near)) for name, near in POSTURES.items()}
 
 
-def read_again(name: str, program: NewProgram) -> Program:
+def texts(name: str, program: NewProgram) -> dict[Path, str]:
     language = BY_NAME[name]
     assert language.new is not None
-    sources = [Source(Path(file), text) for file, text in language.new(program).items()]
+    return {Path(file): text for file, text in language.new(program).items()}
+
+
+def read_again(name: str, program: NewProgram) -> Program:
+    sources = [Source(file, text) for file, text in texts(name, program).items()]
     assert all(source.text.isascii() for source in sources)
-    assert all(language.is_one(source.text) for source in sources)
-    return language.read(sources)
+    assert all(BY_NAME[name].is_one(source.text) for source in sources)
+    return BY_NAME[name].read(sources)
 
 
-@pytest.mark.parametrize("kind", ["joints", "poses"])
-@pytest.mark.parametrize("name", BY_NAME)
-def test_the_own_reader_finds_every_target_again(name: str, kind: str, paths: dict[str, CorrectedPath]) -> None:
-    program = path_program(paths["front-up"], calibrated(), "weld_1", targets=kind, spacing=0.3)  # type: ignore[arg-type]
-    found = read_again(name, program)
-    assert found.skipped == ()
-    assert len(found.targets) == len(found.moves) == len(program)
-    assert [move.target for move in found.moves] == [*range(len(program))]
-    straight = ["joint", *[{"joints": "joint", "poses": "linear"}[kind]] * (len(program) - 1)]
-    assert [move.kind for move in found.moves] == straight
-    for row, target in enumerate(found.targets):
-        form, values = target.form, np.array(target.values)
-        if form.kind == "joints":
-            assert values * form.angle == pytest.approx(program.joints[row], abs=1e-6)
-            continue
-        assert program.poses is not None
-        assert form.orientation is not None
-        assert values[:3] * form.length == pytest.approx(program.poses[row, :3, 3], abs=1e-6)
-        numbers = values[None, 3:] * (1.0 if form.orientation.count == 4 else form.angle)
-        assert form.orientation.matrices(numbers)[0] == pytest.approx(program.poses[row, :3, :3], abs=2e-6)
+def test_the_own_reader_finds_every_target_again(paths: dict[str, CorrectedPath]) -> None:
+    for name, kind in product(BY_NAME, ("joints", "poses")):
+        program = path_program(paths["front-up"], calibrated(), "weld_1", targets=kind, spacing=0.3)  # type: ignore[arg-type]
+        found = read_again(name, program)
+        assert found.skipped == (), (name, kind)
+        assert len(found.targets) == len(found.moves) == len(program), (name, kind)
+        assert [move.target for move in found.moves] == [*range(len(program))], (name, kind)
+        straight = ["joint", *[{"joints": "joint", "poses": "linear"}[kind]] * (len(program) - 1)]
+        assert [move.kind for move in found.moves] == straight, (name, kind)
+        for row, target in enumerate(found.targets):
+            form, values = target.form, np.array(target.values)
+            if form.kind == "joints":
+                assert values * form.angle == pytest.approx(program.joints[row], abs=1e-6), (name, kind)
+                continue
+            assert program.poses is not None, (name, kind)
+            assert form.orientation is not None, (name, kind)
+            assert values[:3] * form.length == pytest.approx(program.poses[row, :3, 3], abs=1e-6), (name, kind)
+            numbers = values[None, 3:] * (1.0 if form.orientation.count == 4 else form.angle)
+            assert form.orientation.matrices(numbers)[0] == pytest.approx(program.poses[row, :3, :3], abs=2e-6), (
+                name,
+                kind,
+            )
 
 
-@pytest.mark.parametrize("posture", POSTURES)
-@pytest.mark.parametrize("name", BY_NAME)
-def test_the_controller_takes_the_posture_that_was_meant(
-    name: str, posture: str, paths: dict[str, CorrectedPath], tmp_path: Path
-) -> None:
-    robot = calibrated()
-    program = path_program(paths[posture], robot, "weld", targets="poses", spacing=0.5)
-    file = tmp_path / "cell.yaml"
-    file.write_text(CELL)
-    cell = Cell(read_tools(robot, file), {})
-    went = commanded(robot, read_again(name, program), cell)
-    assert robot.controller.from_model(went) == pytest.approx(program.joints, abs=2e-5)
+def test_the_controller_takes_the_posture_that_was_meant(paths: dict[str, CorrectedPath], tmp_path: Path) -> None:
+    for name, posture in product(BY_NAME, POSTURES):
+        robot = calibrated()
+        program = path_program(paths[posture], robot, "weld", targets="poses", spacing=0.5)
+        tools = read_tools(robot, cell(tmp_path, CELL))
+        went = commanded(robot, read_again(name, program), Cell(tools, {}))
+        assert robot.controller.from_model(went) == pytest.approx(program.joints, abs=2e-5), (name, posture)
 
 
-@pytest.mark.parametrize("name", BY_NAME)
-def test_an_arm_of_five_joints_has_programs_of_joint_positions(name: str, tmp_path: Path) -> None:
-    katana = load_robot("katana450")
-    file = tmp_path / "path.yaml"
+def test_an_arm_of_five_joints_has_programs_of_joint_positions(tmp_path: Path) -> None:
+    katana, file = load_robot("katana450"), tmp_path / "path.yaml"
     file.write_text(
         "truearm: truearm-path/1\nunits: {length: mm, angle: deg, time: s}\ntip: [0, 0, 130]\nspeed: 100\n"
         "acceleration: 500\nstep: 0.1\nstart: [0, -370, 210]\nsections:\n  - line: [50, -370, 210]\n"
     )
     program = path_program(correct_path(katana, read_path(file)), katana, "weld", targets="joints", spacing=0.2)
-    found = read_again(name, program)
-    assert len(found.targets) == len(program)
-    for row, target in enumerate(found.targets):
-        assert np.array(target.values)[:5] * target.form.angle == pytest.approx(program.joints[row], abs=1e-6)
-        assert not any(target.values[5:])
+    for name in BY_NAME:
+        found = read_again(name, program)
+        assert len(found.targets) == len(program), name
+        for target, joints in zip(found.targets, program.joints, strict=True):
+            assert np.array(target.values)[:5] * target.form.angle == pytest.approx(joints, abs=1e-6), name
+            assert not any(target.values[5:]), name
 
 
 def test_targets_are_some_time_apart_and_ends_of_sections_are_among_them(paths: dict[str, CorrectedPath]) -> None:
@@ -130,47 +129,39 @@ def test_targets_are_some_time_apart_and_ends_of_sections_are_among_them(paths: 
     assert program.durations.sum() == pytest.approx(path.motion.time[-1])
     ends = [int(np.flatnonzero(path.planned.section == number)[-1]) for number in (1, 2)]
     for end in ends:
-        assert (
-            np.abs(program.joints - calibrated().controller.from_model(path.joints["geometry"][end : end + 1]))
-            .max(axis=1)
-            .min()
-            < 1e-12
-        )
+        there = calibrated().controller.from_model(path.joints["geometry"][end : end + 1])
+        assert np.abs(program.joints - there).max(axis=1).min() < 1e-12
     assert program.blend(0) == program.blend(len(program) - 1) == 0.0
     assert 0.0 < program.blend(3) <= 1e-3
 
 
 def test_speed_or_time_stands_in_the_program(paths: dict[str, CorrectedPath]) -> None:
-    def text(name: str, kind: str) -> str:
-        program = path_program(paths["front-up"], calibrated(), "weld", targets=kind, spacing=0.2)  # type: ignore[arg-type]
-        language = BY_NAME[name]
-        assert language.new is not None
-        return "\n".join(language.new(program).values())
+    program = {
+        kind: path_program(paths["front-up"], calibrated(), "weld", targets=kind, spacing=0.2)
+        for kind in ("joints", "poses")
+    }
+    for name, kind, said in (
+        ("rapid", "joints", "\\T:=0.2"),
+        ("rapid", "poses", "\\T:=0.2"),
+        ("fanuc-ls", "joints", "200msec"),
+        ("fanuc-ls", "poses", "100.0mm/sec"),
+        ("urscript", "joints", "t=0.2"),
+        ("krl", "poses", "$VEL.CP = 0.1000"),
+        ("inform", "poses", "V=100.0"),
+        ("val3", "poses", "mPath.tvel=100.0"),
+    ):
+        assert said in "\n".join(texts(name, program[kind]).values()), (name, kind)
 
-    assert "\\T:=0.2" in text("rapid", "joints")
-    assert "\\T:=0.2" in text("rapid", "poses")
-    assert "200msec" in text("fanuc-ls", "joints")
-    assert "100.0mm/sec" in text("fanuc-ls", "poses")
-    assert "t=0.2" in text("urscript", "joints")
-    assert "$VEL.CP = 0.1000" in text("krl", "poses")
-    assert "V=100.0" in text("inform", "poses")
-    assert "mPath.tvel=100.0" in text("val3", "poses")
 
-
-@pytest.mark.parametrize("name", BY_NAME)
-def test_a_corrected_program_is_not_corrected_again(name: str, paths: dict[str, CorrectedPath], tmp_path: Path) -> None:
-    program = path_program(paths["front-up"], calibrated(), "weld", targets="joints", spacing=0.5)
-    language = BY_NAME[name]
-    assert language.new is not None
-    marked = []
-    for file, text in language.new(program).items():
-        (tmp_path / Path(file).name).write_text(text)
-        marked += [tmp_path / Path(file).name] if MARK in text else []
-    assert marked
-    with pytest.raises(InputError, match="corrected already; got \"the comment 'corrected by truearm"):
-        program_files(marked)
-    plain = language.new(replace(program, corrected=False))
-    assert MARK not in "".join(plain.values())
+def test_a_corrected_program_is_not_corrected_again(paths: dict[str, CorrectedPath], tmp_path: Path) -> None:
+    for name in BY_NAME:
+        program = path_program(paths["front-up"], calibrated(), "weld", targets="joints", spacing=0.5)
+        marked = [(tmp_path / file.name, text) for file, text in texts(name, program).items() if MARK in text]
+        for file, text in marked:
+            file.write_text(text)
+        with pytest.raises(InputError, match="corrected already; got \"the comment 'corrected by truearm"):
+            program_files([file for file, _ in marked])
+        assert MARK not in "".join(texts(name, replace(program, corrected=False)).values()), name
 
 
 def test_what_cannot_be_a_program_is_refused(paths: dict[str, CorrectedPath]) -> None:

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 from tests.answered import compensate
+from tests.compensation.workplace import codes, module, pose
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs import LANGUAGES
+from truearm.engine.programs.program import Language
 from truearm.engine.robot.library import load_robot
 
 READ = {
@@ -33,49 +35,32 @@ NOT_READ = {
 }
 
 
-def test_every_language_is_tried() -> None:
-    assert {one.name for one in LANGUAGES} == READ.keys() == NOT_READ.keys()
-    assert {one.name for one in LANGUAGES if one.reads is None} == {name for name, lines in READ.items() if not lines}
-
-
-@pytest.mark.parametrize(("language", "line", "name"), [(k, *one) for k, lines in READ.items() for one in lines])
-def test_what_reads_a_place_is_found(language: str, line: str, name: str) -> None:
-    (reads,) = [one.reads for one in LANGUAGES if one.name == language]
-    assert reads is not None
-    assert name in [found[1] for found in reads.finditer(line)]
-
-
-@pytest.mark.parametrize(("language", "line"), [(k, line) for k, lines in NOT_READ.items() for line in lines])
-def test_what_only_looks_so_is_not(language: str, line: str) -> None:
-    (reads,) = [one.reads for one in LANGUAGES if one.name == language]
-    assert reads is not None
-    assert not [found[1] for found in reads.finditer(line) if found[1] not in (None, "p", "tProbe")]
-
-
-POSE = "[[{x},0,400],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+@pytest.mark.parametrize("language", LANGUAGES, ids=lambda one: one.name)
+def test_what_reads_a_place_is_found_and_what_only_looks_so_is_not(language: Language) -> None:
+    reads, lines = language.reads, READ[language.name]
+    assert (reads is None) == (not lines)
+    if reads is None:
+        return
+    for line, name in lines:
+        assert name in [found[1] for found in reads.finditer(line)], line
+    for line in NOT_READ[language.name]:
+        assert not [found for found in reads.finditer(line) if found[1] not in (None, "p", "tProbe")], line
 
 
 def test_a_branch_that_the_correction_would_change_is_refused(tmp_path: Path) -> None:
     """A height of 0 mm became 1.453, and the robot plunged by 40 mm where the original never did."""
     arm = load_robot("irb120")
     worn = arm.with_values({"a_3": arm.values["a_3"] + 1e-3, "alpha_4": arm.values["alpha_4"] + 1e-3})
-    path, out = tmp_path / "m.mod", tmp_path / "out"
-    points = "".join(f"  CONST robtarget p{k}:={POSE.format(x=300 + 60 * k)};\n" for k in (1, 2, 3))
-    moves = "".join(f"    MoveL p{k},v100,fine,tool0;\n" for k in (1, 2, 3))
-    branch = "    IF p2.trans.z>400 THEN\n      Stop;\n    ENDIF\n"
-    path.write_text(f"MODULE m\n{points}  PROC main()\n{moves}{branch}  ENDPROC\nENDMODULE\n")
+    out, branch = tmp_path / "out", ("IF p2.trans.z>400 THEN", "Stop;", "ENDIF")
+    points = tuple(f"CONST robtarget p{k}:={pose(300 + 60 * k, 0, 400)};" for k in (1, 2, 3))
+    moves = tuple(f"MoveL p{k},v100,fine,tool0;" for k in (1, 2, 3))
+    path = module(tmp_path, *moves, *branch, data=points)
     with pytest.raises(InputError, match=r"computes with numbers of targets.*line 9: p2\.trans\.z\)") as refusal:
         compensate(worn, [path], out=out)
     assert "`accept=numbers-read`" in str(refusal.value)
     assert not out.exists()
-    accepted = compensate(worn, [path], accept=["numbers-read"])
-    assert [one.level for one in accepted.warnings if one.code == "numbers-read"] == ["warning"]
-    for honest in (compensate(worn, [path], keep=["p2"]), compensate(worn, [_without(path, branch)])):
-        assert "numbers-read" not in {one.code for one in honest.warnings}
+    assert codes(compensate(worn, [path], accept=["numbers-read"]))["numbers-read"] == "warning"
+    kept = compensate(worn, [path], keep=["p2"])
+    for honest in (kept, compensate(worn, [module(tmp_path, *moves, data=points)])):
+        assert "numbers-read" not in codes(honest)
         assert honest.files[0].corrected > 1
-
-
-def _without(path: Path, text: str) -> Path:
-    other = path.with_name("other.mod")
-    other.write_text(path.read_text().replace(text, ""))
-    return other

@@ -27,37 +27,21 @@ def plate(tmp_path_factory: pytest.TempPathFactory) -> ProgramCorrection:
     )
 
 
-def test_a_level_program_is_seen_from_above() -> None:
-    view = _flat_view(GRID + np.array([300.0, 0.0, 80.0]))
-    assert view is not None
-    assert view.titles == ("x [mm]", "y [mm]")
-    assert view.seen(GRID) == pytest.approx(GRID[:, :2], abs=1e-9)
-
-
-def test_a_wall_is_seen_from_the_side() -> None:
-    wall = GRID[:, [2, 0, 1]]
-    view = _flat_view(wall)
-    assert view is not None
-    assert view.titles[1] == "z [mm]"
-    assert np.abs(view.seen(wall)[:, 1]) == pytest.approx(np.abs(wall[:, 2]), abs=1e-9)
-
-
-def test_a_slope_keeps_distances() -> None:
+def test_a_plane_keeps_distances_and_space_is_none() -> None:
     c, s = np.cos(0.6), np.sin(0.6)
+    level, wall = GRID + np.array([300.0, 0.0, 80.0]), GRID[:, [2, 0, 1]]
     slope = GRID @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    view = _flat_view(slope)
-    assert view is not None
-    seen = view.seen(slope)
-    assert np.linalg.norm(seen - seen[0], axis=1) == pytest.approx(np.linalg.norm(GRID - GRID[0], axis=1))
-
-
-def test_a_line_is_flat_and_space_is_not() -> None:
     line = np.outer(np.linspace(0.0, 1.0, 5), [100.0, 200.0, 300.0])
-    view = _flat_view(line)
-    assert view is not None
-    assert np.linalg.norm(np.diff(view.seen(line), axis=0), axis=1) == pytest.approx(
-        np.linalg.norm(np.diff(line, axis=0), axis=1)
-    )
+    for points, titles in ((level, ("x [mm]", "y [mm]")), (wall, (None, "z [mm]")), (slope, ()), (line, ())):
+        view = _flat_view(points)
+        assert view is not None
+        assert all(title in (None, seen) for title, seen in zip(titles, view.titles, strict=False))
+        seen = view.seen(points)
+        assert np.linalg.norm(seen - seen[0], axis=1) == pytest.approx(np.linalg.norm(points - points[0], axis=1))
+        if titles and titles[0]:  # from above
+            assert view.seen(GRID) == pytest.approx(GRID[:, :2], abs=1e-9)
+        elif titles:  # from the side
+            assert np.abs(seen[:, 1]) == pytest.approx(np.abs(wall[:, 2]), abs=1e-9)
     assert _flat_view(GRID + np.array([[0.0, 0.0, 2.1 * (i == 2)] for i in range(6)])) is None
     assert _flat_view(GRID[:2]) is None
 

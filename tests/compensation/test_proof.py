@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from tests.answered import compensate
-from tests.plate import PLATE
+from tests.compensation.workplace import cell, codes, plate
 from tests.simulated import campaign
 
 import truearm
 from truearm import InputError, Robot
 from truearm.compensation.report import program_html
-from truearm.compensation.result import ProgramCorrection
 from truearm.engine.base.errors import Notice
 from truearm.engine.robot.robot_file.seal import sealed
 from truearm.engine.robot.robot_file.writing import robot_text
@@ -33,70 +33,63 @@ def robot() -> Robot:
 
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
-    path = tmp_path / "plate.mod"
-    path.write_text(PLATE)
-    return path
+    return plate(tmp_path)
+
+
+def with_proof(robot: Robot, **changes: Any) -> Robot:
+    """Return a robot whose calibration is known to be otherwise."""
+    assert robot.proof is not None
+    return sealed(robot, replace(robot.proof, **changes))
 
 
 def ended(robot: Robot, status: str = "converged", *errors: Notice) -> Robot:
-    assert robot.proof is not None
-    return sealed(robot, replace(robot.proof, status=status, errors=errors))
+    return with_proof(robot, status=status, errors=errors)
 
 
-def codes(correction: ProgramCorrection) -> dict[str, str]:
-    return {notice.code: notice.level for notice in correction.warnings}
-
-
-@pytest.mark.parametrize("status", ["rank-loss", "not-converged", "implausible"])
-def test_an_unsound_fit_corrects_no_program_unless_accepted(robot: Robot, program: Path, status: str) -> None:
-    unsound = ended(robot, status)
-    with pytest.raises(InputError, match=f"got '{status}'.*give `accept={status}`") as refusal:
-        compensate(unsound, [program])
-    assert refusal.value.parameter == "robot"
-    done = compensate(unsound, [program], accept=[status])
-    assert codes(done)[status] == "warning"
-    assert f"accept=['{status}']" in done.command
-    assert done.applied()["proof"]["status"] == status
-
-
-def test_an_error_of_the_calibration_is_told_with_its_words(robot: Robot, program: Path) -> None:
-    unsound = ended(robot, "rank-loss", SIGNS)
-    with pytest.raises(
-        InputError, match=r"rank-loss.*also ended with joint-sign.*`accept=rank-loss` and `accept=joint-sign`"
-    ):
-        compensate(unsound, [program])
-    with pytest.raises(InputError, match="Joint 6 turns the other way"):
-        compensate(unsound, [program], accept=["rank-loss"])
-    assert {"rank-loss", "joint-sign"} <= set(codes(compensate(unsound, [program], accept=["rank-loss", "joint-sign"])))
-
-
-def test_a_warning_that_concerns_programs_is_repeated_and_refuses_nothing(
-    robot: Robot, program: Path, tmp_path: Path
-) -> None:
-    assert robot.proof is not None
-    doubted = sealed(robot, replace(robot.proof, warnings=(FAR,)))
-    path = tmp_path / "calibrated.yaml"
-    path.write_text(robot_text(doubted), encoding="utf-8")
-    correction = compensate(path, [program])
-    assert FAR in correction.warnings
-    assert "edited-by-hand" not in codes(correction)
-    assert "far-from-nominal" not in codes(compensate(robot, [program]))
-
-
-def test_a_calibration_keeps_the_doubt_about_its_nominal_values(program: Path) -> None:
-    data = campaign("irb120", 20, 2e-5, 1)[1]
-    off = replace(data, joints=data.joints + np.radians([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
-    found = truearm.calibrate("irb120", off).robot
-    assert codes(compensate(found, [program]))["far-from-nominal"] == "note"
-    again = truearm.calibrate(found, off, model="frames").robot
-    assert codes(compensate(again, [program]))["far-from-nominal"] == "note"
-
-
-def test_a_wrong_robot_corrects_no_program_unless_accepted(robot: Robot, program: Path) -> None:
+def test_an_unsound_fit_corrects_no_program_unless_accepted(robot: Robot, program: Path) -> None:
+    for status in ("rank-loss", "not-converged", "implausible"):
+        unsound = ended(robot, status)
+        with pytest.raises(InputError, match=f"got '{status}'.*give `accept={status}`") as refusal:
+            compensate(unsound, [program])
+        assert refusal.value.parameter == "robot"
+        done = compensate(unsound, [program], accept=[status])
+        assert codes(done)[status] == "warning"
+        assert f"accept=['{status}']" in done.command
+        assert done.applied()["proof"]["status"] == status
+    # Nor does the robot of a wrong name.
     wrong = ended(robot, "converged", WRONG)
     with pytest.raises(InputError, match=r"got 'wrong-robot'.*not of irb120.*give `accept=wrong-robot`"):
         compensate(wrong, [program])
     assert codes(compensate(wrong, [program], accept=["wrong-robot"]))["wrong-robot"] == "warning"
+
+
+def test_an_error_of_the_calibration_is_told_with_its_words(robot: Robot, program: Path) -> None:
+    unsound = ended(robot, "rank-loss", SIGNS)
+    both = r"rank-loss.*also ended with joint-sign.*`accept=rank-loss` and `accept=joint-sign`"
+    for accepted, said in (([], both), (["rank-loss"], "Joint 6 turns the other way")):
+        with pytest.raises(InputError, match=said):
+            compensate(unsound, [program], accept=accepted)
+    assert {"rank-loss", "joint-sign"} <= set(codes(compensate(unsound, [program], accept=["rank-loss", "joint-sign"])))
+    assert "Calibration: rank-loss, joint-sign" in RobotDescription(unsound).lines()
+    edited = RobotDescription(unsound.with_values({"a_3": 0.2703}))
+    assert "Calibration: rank-loss, joint-sign; values were changed since" in edited.lines()
+    assert edited.summary()["proof"]["intact"] is False
+    assert RobotDescription(truearm.load_robot("irb120")).summary()["proof"] is None
+
+
+def test_a_warning_that_concerns_programs_is_repeated_and_refuses_nothing(robot: Robot, program: Path) -> None:
+    path = program.parent / "calibrated.yaml"
+    path.write_text(robot_text(with_proof(robot, warnings=(FAR,))), encoding="utf-8")
+    correction = compensate(path, [program])
+    assert FAR in correction.warnings
+    assert "edited-by-hand" not in codes(correction)
+    assert "far-from-nominal" not in codes(compensate(robot, [program]))
+    # A calibration keeps the doubt about its nominal values.
+    data = campaign("irb120", 20, 2e-5, 1)[1]
+    off = replace(data, joints=data.joints + np.radians([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+    found = truearm.calibrate("irb120", off).robot
+    for one in (found, truearm.calibrate(found, off, model="frames").robot):
+        assert codes(compensate(one, [program]))["far-from-nominal"] == "note"
 
 
 def test_a_program_of_another_maker_is_not_corrected_unless_accepted(robot: Robot, program: Path) -> None:
@@ -110,22 +103,26 @@ def test_a_program_of_another_maker_is_not_corrected_unless_accepted(robot: Robo
         assert "maker" not in codes(compensate(replace(robot, maker=maker), [program]))
 
 
-def test_narrow_data_are_judged_target_by_target(robot: Robot, program: Path) -> None:
+def test_narrow_data_are_judged_target_by_target_but_of_an_edited_robot(robot: Robot, program: Path) -> None:
     narrow = ended(robot, "converged", NARROW)
     assert codes(compensate(narrow, [program]))["narrow-data"] == "warning"
-    edited = narrow.with_values({"a_3": 0.2703})
-    with pytest.raises(InputError, match="got 'narrow-data'"):
-        compensate(edited, [program])
-    assert "edited-by-hand" in codes(compensate(edited, [program], accept=["narrow-data"]))
+    # That is not cleared of how its fit ended.
+    for one, code in ((narrow, "narrow-data"), (ended(robot, "rank-loss"), "rank-loss")):
+        edited = one.with_values({"a_3": 0.2703})
+        with pytest.raises(InputError, match=f"got '{code}'"):
+            compensate(edited, [program])
+        done = compensate(edited, [program], accept=[code])
+        assert codes(done)["edited-by-hand"] == "warning"
+        assert done.summary()["programs"][0]["expected_mm"] is None
 
 
 def test_only_known_names_are_accepted(robot: Robot, program: Path) -> None:
-    known = "narrow-data, wrong-robot, maker, other-kinematics, numbers-read, skipped, not-better-here"
-    with pytest.raises(InputError, match=known) as refusal:
-        compensate(robot, [program], accept=["rank-lost"])
-    assert refusal.value.parameter == "accept"
-    with pytest.raises(InputError, match="joint-sign, maker, other-kinematics, numbers-read, skipped, not-better-here"):
-        compensate(ended(robot, "converged", SIGNS), [program], accept=["joint-signs"])
+    always = "maker, other-kinematics, numbers-read, skipped, not-better-here"
+    signs = ended(robot, "converged", SIGNS)
+    for one, wrong, known in ((robot, "rank-lost", "narrow-data, wrong-robot"), (signs, "joint-signs", "joint-sign")):
+        with pytest.raises(InputError, match=f"{known}, {always}") as refusal:
+            compensate(one, [program], accept=[wrong])
+        assert refusal.value.parameter == "accept"
     assert codes(compensate(robot, [program], accept=["rank-loss"])) == codes(compensate(robot, [program]))
 
 
@@ -135,23 +132,13 @@ def test_an_unproven_robot_is_corrected_with_a_note(robot: Robot, program: Path)
     assert done.summary()["programs"][0]["expected_mm"] is None
     assert done.applied()["proof"] is None
     assert done.lines()[1] == "plate.mod  RAPID: the error to expect is not known"
-    with pytest.raises(InputError, match="not calibrated"):
+    with pytest.raises(InputError, match="not calibrated") as refusal:
         compensate("irb120", [program])
-
-
-def test_a_payload_leaves_the_proof(robot: Robot, program: Path) -> None:
+    assert refusal.value.parameter == "robot"
+    # A payload leaves the proof.
     done = compensate(robot, [program], payload="1kg,0mm,0mm,50mm")
     assert "edited-by-hand" not in codes(done)
     assert done.summary()["programs"][0]["expected_mm"] is not None
-
-
-def test_an_edited_robot_is_not_cleared_of_how_its_fit_ended(robot: Robot, program: Path) -> None:
-    edited = ended(robot, "rank-loss").with_values({"a_3": 0.2703})
-    with pytest.raises(InputError, match="rank-loss"):
-        compensate(edited, [program])
-    done = compensate(edited, [program], accept=["rank-loss"])
-    assert codes(done)["edited-by-hand"] == "warning"
-    assert done.summary()["programs"][0]["expected_mm"] is None
 
 
 def test_joints_for_poses_and_exports_are_made_with_a_warning(robot: Robot, tmp_path: Path) -> None:
@@ -169,15 +156,6 @@ def test_joints_for_poses_and_exports_are_made_with_a_warning(robot: Robot, tmp_
         assert {"rank-loss", "joint-sign", "edited-by-hand"} <= {notice["code"] for notice in summary["warnings"]}
     assert truearm.inverse(robot, position, rotation).warnings == ()
     assert truearm.inverse("irb120", position, rotation).warnings == ()
-
-
-def test_the_description_of_a_robot_says_how_its_calibration_ended(robot: Robot) -> None:
-    unsound = ended(robot, "rank-loss", SIGNS)
-    assert "Calibration: rank-loss, joint-sign" in RobotDescription(unsound).lines()
-    edited = RobotDescription(unsound.with_values({"a_3": 0.2703}))
-    assert "Calibration: rank-loss, joint-sign; values were changed since" in edited.lines()
-    assert edited.summary()["proof"]["intact"] is False
-    assert RobotDescription(truearm.load_robot("irb120")).summary()["proof"] is None
 
 
 def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -> None:
@@ -201,12 +179,11 @@ def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -
 
 def test_targets_that_were_measured_nowhere_near_are_named(robot: Robot, program: Path) -> None:
     assert robot.proof is not None
-    known = compensate(robot, [program])
-    assert "beyond-measured" not in codes(known)
     (low, high), *others = robot.proof.region
-    turned = ((low + 2 * np.pi, high + 2 * np.pi), *others)
-    assert "beyond-measured" not in codes(compensate(sealed(robot, replace(robot.proof, region=turned)), [program]))
-    elsewhere = sealed(robot, replace(robot.proof, region=((1.5, 2.0), *others)))
+    turned = with_proof(robot, region=((low + 2 * np.pi, high + 2 * np.pi), *others))
+    for one in (robot, turned):
+        assert "beyond-measured" not in codes(compensate(one, [program]))
+    elsewhere = with_proof(robot, region=((1.5, 2.0), *others))
     (notice,) = [n for n in compensate(elsewhere, [program]).warnings if n.code == "beyond-measured"]
     assert "axis_1 stood well outside the range measured in calibration: plate.mod line 8" in notice.message
 
@@ -215,7 +192,7 @@ def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
     assert robot.proof is not None
     for bound in (True, False):
         vague = tuple(5.0 * deviation for deviation in robot.proof.deviations)
-        done = compensate(sealed(robot, replace(robot.proof, lower_bound=bound, deviations=vague)), [program])
+        done = compensate(with_proof(robot, lower_bound=bound, deviations=vague), [program])
         assert done.summary()["expected_is_lower_bound"] is bound
         assert any("may be larger: the calibration" in line for line in done.lines()) is bound
         low, high = done.summary()["programs"][0]["expected_mm"]["after"]["interval_90"]
@@ -227,34 +204,29 @@ def test_a_lower_bound_is_called_one(robot: Robot, program: Path) -> None:
         assert (f"the mean is {low:.3f} to " in page) is not bound
 
 
-def test_errors_in_measured_frames_are_not_called_relative(robot: Robot, program: Path, tmp_path: Path) -> None:
-    cell = tmp_path / "cell.yaml"
-    cell.write_text(
-        "truearm: truearm-cell/1\nunits: {length: mm, angle: deg}\n"
-        "frames:\n  wobjPlate: {of: base, translation: [310, -110, 60]}\n"
-    )
-    assert any("RAPID: error to expect" in line for line in compensate(robot, [program], frames=cell).lines())
+def test_errors_without_measured_frames_are_called_relative(robot: Robot, program: Path, tmp_path: Path) -> None:
+    frames = cell(tmp_path, "frames:\n  wobjPlate: {of: base, translation: [310, -110, 60]}\n")
+    assert any("RAPID: error to expect" in line for line in compensate(robot, [program], frames=frames).lines())
+    made = compensate(robot, [program])
+    assert "of all programs together" in made.relative
+    assert made.summary()["expected_is_relative"] is True
+    assert "in each frame" in compensate(robot, [program], taught=["frames"]).relative
 
 
 def test_nothing_is_promised_that_no_robot_repeats(robot: Robot, program: Path) -> None:
     """A calibration from hundreds of readings without noise knows its parameters to nanometres; no arm goes there."""
     assert robot.proof is not None
-    known = replace(
-        robot.proof,
-        deviations=tuple(1e-6 * d for d in robot.proof.deviations),
-        joint_error=tuple(0.0 for _ in robot.proof.joint_error),
-        lower_bound=False,
-    )
-    done = compensate(sealed(robot, known), [program])
+    deviations = tuple(1e-6 * d for d in robot.proof.deviations)
+    known = with_proof(robot, deviations=deviations, joint_error=(0.0,) * 6, lower_bound=False)
+    done = compensate(known, [program])
     assert " mm before, 0.010 mm or more now (no robot repeats better); " in done.lines()[1]
     after = done.summary()["programs"][0]["expected_mm"]["after"]
     assert (after["mean"], after["max"]) == pytest.approx((0.01, 0.01))
 
 
 def test_targets_that_rather_get_worse_are_kept_and_listed(robot: Robot, program: Path, tmp_path: Path) -> None:
-    proof = robot.proof
-    assert proof is not None
-    vague = sealed(robot, replace(proof, deviations=tuple(50.0 * d for d in proof.deviations)))
+    assert robot.proof is not None
+    vague = with_proof(robot, deviations=tuple(50.0 * d for d in robot.proof.deviations))
     done = compensate(vague, [program], out=tmp_path / "out")
     (file,) = done.files
     kept = [row for row in file.not_better if not file.correction.corrected[row]]

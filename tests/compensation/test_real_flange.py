@@ -98,18 +98,10 @@ def program(spread: float, rng: np.random.Generator) -> str:
         "[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tProbe\\WObj:=wobjPlate;"
         for (x, y, z), q in zip(rng.uniform(0, [200, 200, 60], (24, 3)).tolist(), quaternions.tolist(), strict=True)
     ]
-    return "\n".join(
-        [
-            "MODULE P",
-            "  PERS tooldata tProbe:=[TRUE,[[0,0,125],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];",
-            '  PERS wobjdata wobjPlate:=[FALSE,TRUE,"",[[310,-110,60],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];',
-            "  PROC main()",
-            "    ConfJ\\Off;",
-            *lines,
-            "  ENDPROC",
-            "ENDMODULE\n",
-        ]
-    )
+    tool = "PERS tooldata tProbe:=[TRUE,[[0,0,125],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]];"
+    frame = 'PERS wobjdata wobjPlate:=[FALSE,TRUE,"",[[310,-110,60],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+    moves = "\n".join(lines)
+    return f"MODULE P\n{tool}\n{frame}\nPROC main()\n    ConfJ\\Off;\n{moves}\nENDPROC\nENDMODULE\n"
 
 
 @dataclass(frozen=True)

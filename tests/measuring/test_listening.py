@@ -88,48 +88,46 @@ def test_a_program_with_the_token_is_told_what_became_of_each_line(port: Port) -
     assert TOKEN not in (port.campaign.log.path).read_text()
 
 
-@pytest.mark.parametrize(
-    ("line", "word"),
-    [
-        ("reading a 1 2 3", "three coordinates and their unit"),
-        ("reading a 1 2 3 furlong", "unit of length"),
-        ("reading a 1 nan 3 mm", "number belongs here"),
-        ("reading a 1 1e999 3 mm", "number belongs here"),
-        ("reading a 1 2 1e30 mm", "too large to be plausible"),
-        ("reading a 1 2 3 mm colour=red", "cannot stand here"),
-        ("reading a 1 2 3 mm samples=2 samples=3", "cannot stand here"),
-        ("reading a 1 2 3 mm samples=-1", "count belongs here"),
-        ("reading a 1 2 3 mm deviation=-1", "number belongs here"),
-        ("reading a 1 2 3 mm q=1,1,0,0", "length 1"),
-        ("reading a 1 2 3 mm q=1,0", "length 1"),
-        ("left P1", "by its configuration and its name"),
-        ("left P7 a", "no such configuration"),
-        ("erase everything", "no such line"),
-        ('reading "a 1 2 3 mm', "no such line"),
-    ],
-)
-def test_a_line_that_cannot_be_taken_is_refused_and_counted(port: Port, line: str, word: str) -> None:
+REFUSED = {
+    "reading a 1 2 3": "three coordinates and their unit",
+    "reading a 1 2 3 furlong": "unit of length",
+    "reading a 1 nan 3 mm": "number belongs here",
+    "reading a 1 1e999 3 mm": "number belongs here",
+    "reading a 1 2 1e30 mm": "too large to be plausible",
+    "reading a 1 2 3 mm colour=red": "cannot stand here",
+    "reading a 1 2 3 mm samples=2 samples=3": "cannot stand here",
+    "reading a 1 2 3 mm samples=-1": "count belongs here",
+    "reading a 1 2 3 mm deviation=-1": "number belongs here",
+    "reading a 1 2 3 mm q=1,1,0,0": "length 1",
+    "reading a 1 2 3 mm q=1,0": "length 1",
+    "left P1": "by its configuration and its name",
+    "left P7 a": "no such configuration",
+    "erase everything": "no such line",
+    'reading "a 1 2 3 mm': "no such line",
+}
+
+
+def test_a_line_that_cannot_be_taken_is_refused_and_counted(port: Port) -> None:
     stream = port.connect()
     heard(stream)
-    said = port.say(stream, line)
-    assert said.startswith("refused ")
-    assert word in said
-    assert len(said) <= LONGEST_LINE + 1
-    assert port.codes == ["lines-refused"]
-    assert len(port.campaign.session) == 0
+    for line, word in REFUSED.items():
+        said = port.say(stream, line)
+        assert said.startswith("refused "), line
+        assert word in said
+        assert len(said) <= LONGEST_LINE + 1
+        assert port.codes == ["lines-refused"]
+        assert len(port.campaign.session) == 0
     assert port.say(stream, "reading a 1 2 3 mm").startswith("kept 1")
 
 
-@pytest.mark.parametrize(
-    "greeting", ["token wrong", "token", f"reading a 1 2 3 mm {TOKEN}", f"TOKEN {TOKEN}", "\ud83d"]
-)
-def test_without_the_token_nothing_is_taken(port: Port, greeting: str) -> None:
-    stream = port.connect(None)
-    stream.sendall(greeting.encode("utf-8", "surrogatepass") + b"\nreading a 1 2 3 mm\n")
-    port.turn()
-    assert heard(stream) == "refused this is not the token\n"
-    assert heard(stream) == ""
-    assert port.codes == ["wrong-tokens"]
+def test_without_the_token_nothing_is_taken(port: Port) -> None:
+    for greeting in ("token wrong", "token", f"reading a 1 2 3 mm {TOKEN}", f"TOKEN {TOKEN}", "\ud83d"):
+        stream = port.connect(None)
+        stream.sendall(greeting.encode("utf-8", "surrogatepass") + b"\nreading a 1 2 3 mm\n")
+        port.turn()
+        assert heard(stream) == "refused this is not the token\n", greeting
+        assert heard(stream) == ""
+        assert port.codes == ["wrong-tokens"]
     assert len(port.campaign.session) == 0
     assert TOKEN not in "".join(port.listener.told())
 
@@ -199,10 +197,8 @@ def test_a_port_that_is_the_systems_is_refused(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_token_is_made_where_none_is_given() -> None:
-    tokens = []
-    for _ in range(2):
-        listener = Listener(0)
-        tokens.append(listener.token)
+    listeners = [Listener(0) for _ in range(2)]
+    for listener in listeners:
         listener.close()
-    assert len(set(tokens)) == 2
-    assert min(map(len, tokens)) >= 32
+    assert len({listener.token for listener in listeners}) == 2
+    assert min(len(listener.token) for listener in listeners) >= 32

@@ -1,4 +1,7 @@
-"""A plan measured from the first reading to a calibration, stopped and gone on with, by every source."""
+"""A plan measured from the first reading to a calibration, stopped and gone on with, by every source.
+
+And the command that measures: what it prints, its JSON, its exit codes, and what a kill leaves.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,22 @@ import json
 import os
 import signal
 import socket
+import subprocess
+import sys
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.commanding import Truearm
 from tests.house.examples import MEASURED_PLAN
 
 import truearm
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import read_csv
 from truearm.engine.twin.devices import DEVICES
-from truearm.engine.twin.devices.device import Device
 from truearm.measuring.begun import BEGUN
 from truearm.measuring.measure import open_campaign
 from truearm.measuring.open_campaign import sight
@@ -45,9 +51,19 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def seen_by(device: str, poses: int, folder: Path) -> Path:
     """Write a plan of configurations that a device can measure."""
     data = truearm.simulate("irb120", truth="nominal", poses=poses, device=device).data
-    rows = (",".join(map(repr, row)) for row in np.degrees(data.joints).tolist())
-    path = folder / "plan.csv"
-    path.write_text(MEASURED_PLAN.splitlines()[0] + "\n" + "".join(f"{k},{row}\n" for k, row in enumerate(rows, 1)))
+    return plan_of(folder, *(",".join(map(repr, row)) for row in np.degrees(data.joints).tolist()))
+
+
+def plan_of(folder: Path, *rows: str) -> Path:
+    path = folder / "few.csv"
+    path.write_text("\n".join([MEASURED_PLAN.splitlines()[0], *(f"{k},{row}" for k, row in enumerate(rows, 1))]) + "\n")
+    return path
+
+
+def with_reads(planned: Path, path: Path, reads: list[str]) -> Path:
+    """Write a plan that says what is read at each configuration."""
+    head, *rows = planned.read_text().splitlines()
+    path.write_text("\n".join([f"{head},reads", *map(",".join, zip(rows, reads, strict=True))]) + "\n")
     return path
 
 
@@ -65,17 +81,8 @@ def arm(plan: Path, out: Path, **more: Any) -> Any:
 
 def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(planned: Path, tmp_path: Path) -> None:
     told: list[str] = []
-    found = truearm.measure(
-        planned,
-        "irb120",
-        out=tmp_path,
-        device="tracker",
-        seed=3,
-        disturbed=0.2,
-        nests=["n1", "n2", "n3"],
-        every=6,
-        tell=told.append,
-    )
+    given: dict[str, Any] = {"device": "tracker", "seed": 3, "disturbed": 0.2, "nests": ["n1", "n2", "n3"], "every": 6}
+    found = truearm.measure(planned, "irb120", out=tmp_path, tell=told.append, **given)
     assert found.finished
     assert len(told) == len(found.session.entries)
     reasons = found.session.aside_by_reason
@@ -97,13 +104,14 @@ def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(
 
 
 def test_what_was_stopped_goes_on_to_the_same_files(plan: Path, tmp_path: Path) -> None:
-    whole = tmp_path / "whole"
-    arm(plan, whole, seed=1, disturbed=0.3)
+    whole, given = tmp_path / "whole", {"seed": 1, "disturbed": 0.3}
+    arm(plan, whole, **given)
     for stopped in (1, 4, 7):
         part = tmp_path / f"part-{stopped}"
-        with open_campaign(
-            plan, "irb120", part, device="measurement-arm", nests=["n"], every=2, seed=1, disturbed=0.3
-        ) as campaign:
+        more: dict[str, Any] = {"device": "measurement-arm", "nests": ["n"], "every": 2, **given}
+        with open_campaign(plan, "irb120", part, **more) as campaign:
+            assert isinstance(campaign.source, VirtualInstrument)
+            assert not any(campaign.source.hides)  # what an arm touches needs no line of sight
             for _ in range(stopped):
                 campaign.step()
             step = campaign.session.next
@@ -111,55 +119,43 @@ def test_what_was_stopped_goes_on_to_the_same_files(plan: Path, tmp_path: Path) 
         assert step is not None
         assert f"next is {step.label}, {step.names[0]}" in unfinished.warnings[0].message
         told: list[str] = []
-        arm(plan, part, seed=1, disturbed=0.3, tell=told.append)
+        arm(plan, part, tell=told.append, **given)
         assert told[0].startswith(f"Going on after {stopped} entries")
         for name in (LOG, DATA):
             assert (part / name).read_bytes() == (whole / name).read_bytes()
-    before = (whole / DATA).read_bytes()
-    assert arm(plan, whole, seed=1, disturbed=0.3).finished
-    assert (whole / DATA).read_bytes() == before
-
-
-def test_a_torn_line_is_said_and_measured_again(plan: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    arm(plan, out)
-    log, data = (out / LOG).read_bytes(), (out / DATA).read_bytes()
-    (out / LOG).write_bytes(log[:-7])
-    found = arm(plan, out)
-    (notice,) = [notice for notice in found.warnings if notice.code == "torn-line"]
+    # What is finished stays as it is, and a torn line is said and measured again.
+    log, before = (whole / LOG).read_bytes(), (whole / DATA).read_bytes()
+    assert arm(plan, whole, **given).finished
+    (whole / LOG).write_bytes(log[:-7])
+    (notice,) = [notice for notice in arm(plan, whole, **given).warnings if notice.code == "torn-line"]
     assert notice.level == "note"
-    assert ((out / LOG).read_bytes(), (out / DATA).read_bytes()) == (log, data)
+    assert ((whole / LOG).read_bytes(), (whole / DATA).read_bytes()) == (log, before)
 
 
-@pytest.mark.parametrize(
-    ("change", "word"),
-    [
+def test_a_folder_that_began_otherwise_is_refused(plan: Path, tmp_path: Path) -> None:
+    out, about = tmp_path / "out", tmp_path / "about.yaml"
+    said = "truearm: truearm-about/1\nunits: {}\ninstrument: {serial: %s}\n"
+    about.write_text(said % "A")
+    arm(plan, out, about=about)
+    changes: tuple[tuple[dict[str, Any], str], ...] = (
         ({"targets": ["nest"], "nests": ["m"]}, "nests"),
         ({"every": 3}, "every"),
         ({"seed": 2}, "source of readings"),
         ({"most_deviation": 1e-3}, "limit of what is kept"),
         ({"payload": "1kg,0mm,0mm,50mm"}, "source of readings"),
-    ],
-)
-def test_a_folder_that_began_otherwise_is_refused(
-    plan: Path, tmp_path: Path, change: dict[str, Any], word: str
-) -> None:
-    out = tmp_path / "out"
-    arm(plan, out)
-    with pytest.raises(InputError, match=f"began with another {word}") as refusal:
-        arm(plan, out, **change)
-    assert refusal.value.parameter == "out"
-
-
-def test_another_plan_robot_or_instrument_is_refused(plan: Path, tmp_path: Path) -> None:
-    out, about = tmp_path / "out", tmp_path / "about.yaml"
-    about.write_text("truearm: truearm-about/1\nunits: {}\ninstrument: {serial: A}\n")
-    arm(plan, out, about=about)
-    about.write_text("truearm: truearm-about/1\nunits: {}\ninstrument: {serial: B}\n")
+    )
+    for change, word in changes:
+        with pytest.raises(InputError, match=f"began with another {word}") as refusal:
+            arm(plan, out, about=about, **change)
+        assert refusal.value.parameter == "out"
+    about.write_text(said % "B")
     with pytest.raises(InputError, match="another instrument or robot"):
         arm(plan, out, about=about)
-    with pytest.raises(InputError, match="another robot"):
-        truearm.measure(plan, "irb1600", out=out, device="measurement-arm", nests=["n"], every=2)
+    changed = truearm.load_robot("irb120").with_values({"a_3": 0.271})
+    for robot, got in (("irb1600", "'irb1600'; allowed: irb120."), (changed, "with other values'; allowed: irb120 as")):
+        with pytest.raises(InputError, match="began with another robot") as refusal:
+            truearm.measure(plan, robot, out=out, device="measurement-arm", nests=["n"], every=2)
+        assert got in str(refusal.value)
     plan.write_text(MEASURED_PLAN.replace("P2,20", "P2,21"))
     with pytest.raises(InputError, match="another plan"):
         arm(plan, out)
@@ -171,15 +167,23 @@ def test_another_plan_robot_or_instrument_is_refused(plan: Path, tmp_path: Path)
         arm(plan, out)
 
 
-def test_rows_of_a_folder_become_the_same_file_as_the_import_of_the_table(plan: Path, tmp_path: Path) -> None:
+@pytest.fixture
+def watching(tmp_path: Path) -> dict[str, Any]:
+    """What is given for a folder that is watched, with a first row in it."""
     inside, mapping = tmp_path / "in", tmp_path / "map.yaml"
     inside.mkdir()
     mapping.write_text(MAPPING)
+    (inside / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\n")
+    return {"watch": inside, "mapping": mapping, "targets": ["a"], "out": tmp_path / "out"}
+
+
+def test_rows_of_a_folder_become_the_same_file_as_the_import_of_the_table(
+    plan: Path, watching: dict[str, Any], tmp_path: Path
+) -> None:
     rows = "".join(f"P{k},{name},{k}.5,{n},3\n" for k in (1, 2, 3) for n, name in enumerate("ab"))
-    (inside / "points.csv").write_text(f"Pose,Point,X,Y,Z\n{rows}")
-    found = truearm.measure(plan, "irb120", out=tmp_path / "out", watch=inside, mapping=mapping, targets=["a", "b"])
-    assert found.finished
-    imported = truearm.import_table(inside / "points.csv", mapping).data
+    (watching["watch"] / "p.csv").write_text(f"Pose,Point,X,Y,Z\n{rows}")
+    assert truearm.measure(plan, "irb120", **watching | {"targets": ["a", "b"]}).finished
+    imported = truearm.import_table(watching["watch"] / "p.csv", watching["mapping"]).data
     data = read_csv(tmp_path / "out" / DATA)
     assert (data.labels, data.targets) == (imported.labels, imported.targets)
     np.testing.assert_array_equal(data.position, imported.position)
@@ -187,37 +191,23 @@ def test_rows_of_a_folder_become_the_same_file_as_the_import_of_the_table(plan: 
     assert data.number is not None
 
 
-def test_a_folder_into_which_nothing_comes_is_left_after_a_while(plan: Path, tmp_path: Path) -> None:
-    (tmp_path / "in").mkdir()
-    (tmp_path / "map.yaml").write_text(MAPPING)
-    given: dict[str, Any] = {"watch": tmp_path / "in", "mapping": tmp_path / "map.yaml", "targets": ["a"]}
-    found = truearm.measure(plan, "irb120", out=tmp_path / "out", timeout=0.0, **given)
-    assert found.files == ()
-    assert found.data is None
+def test_a_folder_into_which_nothing_comes_is_left_after_a_while(plan: Path, watching: dict[str, Any]) -> None:
+    row = (watching["watch"] / "p.csv").rename(watching["out"].with_name("later.csv"))
+    found = truearm.measure(plan, "irb120", timeout=0.0, **watching)
+    assert (found.files, found.data) == ((), None)
     assert "unfinished" in {notice.code for notice in found.warnings}
-    (tmp_path / "in" / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\n")
-    assert truearm.measure(plan, "irb120", out=tmp_path / "out", timeout=0.0, **given).files == (DATA, PAGE)
+    row.rename(watching["watch"] / "p.csv")
+    assert truearm.measure(plan, "irb120", timeout=0.0, **watching).files == (DATA, PAGE)
 
 
-def test_ctrl_c_ends_with_what_is_there(plan: Path, tmp_path: Path) -> None:
-    (tmp_path / "in").mkdir()
-    (tmp_path / "map.yaml").write_text(MAPPING)
-    (tmp_path / "in" / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\n")
+def test_ctrl_c_ends_with_what_is_there(plan: Path, watching: dict[str, Any]) -> None:
     told: list[str] = []
 
     def tell(line: str) -> None:
         told.append(line)
         threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT)).start()
 
-    found = truearm.measure(
-        plan,
-        "irb120",
-        out=tmp_path / "out",
-        watch=tmp_path / "in",
-        mapping=tmp_path / "map.yaml",
-        targets=["a"],
-        tell=tell,
-    )
+    found = truearm.measure(plan, "irb120", tell=tell, **watching)
     assert len(told) == 1
     assert found.files == (DATA, PAGE)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -269,23 +259,25 @@ def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_p
         assert sight(campaign) is None
 
 
+MORE_ROWS = "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9))
+
+
 def test_what_an_instrument_that_drifts_does_to_the_nests_is_said(plan: Path, tmp_path: Path) -> None:
-    plan.write_text(MEASURED_PLAN + "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9)))
-    found = arm(plan, tmp_path / "out", nests=["n1", "n2", "n3"], noise=1e-5, drift=3e-4)
+    plan.write_text(MEASURED_PLAN + MORE_ROWS)
+    given: dict[str, Any] = {"nests": ["n1", "n2", "n3"], "noise": 1e-5}
+    found = arm(plan, tmp_path / "out", drift=3e-4, **given)
     (notice,) = [n for n in found.warnings if n.code == "nests-moved"]
     assert notice.level == "warning"
     drift = found.drift
     assert drift is not None
     assert drift.largest == pytest.approx(3e-4, rel=0.2)
     assert np.isfinite(drift.moved).all()
-    calm = arm(plan, tmp_path / "calm", nests=["n1", "n2", "n3"], noise=1e-5)
-    assert "nests-moved" not in {n.code for n in calm.warnings}
-    summary = json.loads(json.dumps(found.summary()))
-    assert summary["nests"]["rounds"] == len(drift.rounds)
+    assert json.loads(json.dumps(found.summary()))["nests"]["rounds"] == len(drift.rounds)
+    assert "nests-moved" not in {n.code for n in arm(plan, tmp_path / "calm", **given).warnings}
 
 
 def test_a_drift_of_one_nest_is_told_where_nothing_states_a_deviation(plan: Path, tmp_path: Path) -> None:
-    plan.write_text(MEASURED_PLAN + "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9)))
+    plan.write_text(MEASURED_PLAN + MORE_ROWS)
     rng = np.random.default_rng(0)
     codes = []
     for number, drift in enumerate((0.0, 0.5)):
@@ -337,47 +329,34 @@ SEEN_AND_BLIND: dict[str, tuple[str, str, str]] = {
 }
 
 
-def plan_of(folder: Path, *rows: str) -> Path:
-    path = folder / "few.csv"
-    path.write_text("\n".join([MEASURED_PLAN.splitlines()[0], *(f"{k},{row}" for k, row in enumerate(rows, 1))]) + "\n")
-    return path
+def test_a_plan_of_which_an_instrument_sees_nothing_is_refused_before_anything_is_logged(tmp_path: Path) -> None:
+    tracker = ("", "180,0,0,0,0,0", "a reflector must look at the tracker within 30 deg")
+    for device, (_, blind, why) in {"tracker": tracker, **SEEN_AND_BLIND}.items():
+        few, pairs = plan_of(tmp_path, blind, blind.replace("0,0,0", "0,0,9")), 6 if device == "tracker" else 2
+        with pytest.raises(InputError, match=f"nothing of this plan can be read with the {device}") as refusal:
+            truearm.measure(few, "irb120", out=tmp_path / "out", device=device, truth="nominal", nests=["n"])
+        assert refusal.value.parameter == "plan"
+        assert why in str(refusal.value)
+        assert f"got 0 of {pairs} pairs of configuration and target" in str(refusal.value)
+        assert f"`truearm plan` with `device={device}`" in str(refusal.value)
+        assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("device", ["tracker", *SEEN_AND_BLIND])
-def test_a_plan_of_which_an_instrument_sees_nothing_is_refused_before_anything_is_logged(
-    device: str, tmp_path: Path
-) -> None:
-    why = "a reflector must look at the tracker within 30 deg"
-    _, blind, why = SEEN_AND_BLIND.get(device, ("", "180,0,0,0,0,0", why))
-    few, pairs = plan_of(tmp_path, blind, blind.replace("0,0,0", "0,0,9")), 6 if device == "tracker" else 2
-    with pytest.raises(InputError, match=f"nothing of this plan can be read with the {device}") as refusal:
-        truearm.measure(few, "irb120", out=tmp_path / "out", device=device, truth="nominal", nests=["n"])
-    assert refusal.value.parameter == "plan"
-    assert why in str(refusal.value)
-    assert f"got 0 of {pairs} pairs of configuration and target" in str(refusal.value)
-    assert f"`truearm plan` with `device={device}`" in str(refusal.value)
-    assert "on the page Plan of the studio the field Instrument" in str(refusal.value)
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("device", SEEN_AND_BLIND)
-def test_what_an_instrument_does_not_see_of_a_plan_is_counted_before_the_first_reading(
-    device: str, tmp_path: Path
-) -> None:
-    seen, blind, why = SEEN_AND_BLIND[device]
-    few = plan_of(tmp_path, blind, seen, blind.replace("0,0,0", "0,0,9"))
-    with open_campaign(few, "irb120", tmp_path / "out", device=device, truth="nominal") as campaign:
-        assert len(campaign.session) == 0
-        (notice,) = [one for one in campaign.notices if one.code == "not-seen"]
-        assert notice.level == "warning"
-        assert f"{device} 1 of 3 pairs of configuration and target can be read, none at 2 of 3" in notice.message
-        assert why in notice.message
-        while not campaign.session.done:
-            campaign.step()
-        assert len(campaign.session.kept) == 1
-        codes = [one.code for one in campaign.measured().warnings]
-    assert "not-seen" in codes
-    assert "many-left-out" not in codes  # it would say the same again
+def test_what_an_instrument_does_not_see_of_a_plan_is_counted_before_the_first_reading(tmp_path: Path) -> None:
+    for device, (seen, blind, why) in SEEN_AND_BLIND.items():
+        few = plan_of(tmp_path, blind, seen, blind.replace("0,0,0", "0,0,9"))
+        with open_campaign(few, "irb120", tmp_path / device, device=device, truth="nominal") as campaign:
+            assert len(campaign.session) == 0
+            (notice,) = [one for one in campaign.notices if one.code == "not-seen"]
+            assert notice.level == "warning"
+            assert f"{device} 1 of 3 pairs of configuration and target can be read, none at 2 of 3" in notice.message
+            assert why in notice.message
+            while not campaign.session.done:
+                campaign.step()
+            assert len(campaign.session.kept) == 1
+            codes = [one.code for one in campaign.measured().warnings]
+        assert "not-seen" in codes
+        assert "many-left-out" not in codes  # it would say the same again
 
 
 def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is_not_judged(
@@ -391,10 +370,7 @@ def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is
         seen = [names[campaign.source.visible(k)] for k in range(24)]
     assert notice.level == "note"
     assert f"{sum(map(len, seen))} of 72 pairs of configuration and target can be read, some at every" in notice.message
-    head, *rows = planned.read_text().splitlines()
-    reads = (f"{row},{'; '.join(at)}" for row, at in zip(rows, seen, strict=True))
-    path = tmp_path / "reads.csv"
-    path.write_text("\n".join([f"{head},reads", *reads]) + "\n")
+    path = with_reads(planned, tmp_path / "reads.csv", ["; ".join(at) for at in seen])
     with open_campaign(path, "irb120", tmp_path / "reads", **given) as campaign:
         assert "not-seen" not in {one.code for one in campaign.notices}
     few = plan_of(tmp_path, "180,0,0,0,0,0")
@@ -402,42 +378,25 @@ def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is
         assert "not-seen" not in {one.code for one in campaign.notices}
 
 
-def test_what_an_arm_touches_needs_no_line_of_sight(plan: Path, tmp_path: Path) -> None:
-    with open_campaign(plan, "irb120", tmp_path, device="measurement-arm", nests=["n1", "n2", "n3"]) as campaign:
-        assert isinstance(campaign.source, VirtualInstrument)
-        assert not any(campaign.source.hides)
-
-
 def test_the_column_reads_of_a_plan_says_what_is_asked_for(planned: Path, tmp_path: Path) -> None:
-    head, *rows = planned.read_text().splitlines()
-    path = tmp_path / "reads.csv"
-    path.write_text(
-        "\n".join([f"{head},reads", *(f"{row},{'1; 3' if k else '2'}" for k, row in enumerate(rows))]) + "\n"
-    )
-    with open_campaign(path, "irb120", tmp_path / "all", listen=0, targets=["1", "2", "3"]) as campaign:
-        assert campaign.session.outstanding == 1 + 2 * 23
-    with open_campaign(path, "irb120", tmp_path / "other", listen=0, targets=["smr"]) as campaign:
-        assert campaign.session.outstanding == 24
-    with open_campaign(path, "irb120", tmp_path / "beside", listen=0, targets=["2", "smr"]) as campaign:
-        assert campaign.session.outstanding == 25
-    truearm.measure(path, "irb120", out=tmp_path / "virtual", device="tracker", targets=["1", "2", "3"])
-    head, *lines = (tmp_path / "virtual/measurements.csv").read_text().splitlines()
-    at = head.split(",").index("target")
-    read = {(line.split(",")[0], line.split(",")[at]) for line in lines}
-    first = rows[0].split(",")[0]
-    assert not any(target == "2" and label != first for label, target in read)  # nobody asked for it
+    path = with_reads(planned, tmp_path / "reads.csv", ["2", *["1; 3"] * 23])
+    for targets, count in ((["1", "2", "3"], 1 + 2 * 23), (["smr"], 24), (["2", "smr"], 25)):
+        with open_campaign(path, "irb120", tmp_path / targets[0] / str(count), listen=0, targets=targets) as campaign:
+            assert campaign.session.outstanding == count
+    found = truearm.measure(path, "irb120", out=tmp_path / "virtual", device="tracker", targets=["1", "2", "3"])
+    first = found.session.labels[0]
+    assert not [e for e in found.session.kept if e.name == "2" and e.label != first]  # nobody asked for it
 
 
-@pytest.mark.parametrize(("unit", "told"), [("mm", False), ("m", True), ("um", True)])
-def test_lengths_that_cannot_be_meant_are_told(plan: Path, tmp_path: Path, unit: str, told: bool) -> None:
-    with open_campaign(plan, "irb120", tmp_path / "out", listen=0, targets=["a"]) as campaign:
-        places = campaign.robot.world_poses(campaign.joints)[0] * 1e3  # as a number, in mm
-        for label, place in zip(campaign.session.labels, places, strict=True):
-            reading = Reading("a", 1.0, place * {"mm": 1e-3, "m": 1.0, "um": 1e-6}[unit], label=label)
-            campaign._written(campaign.session.judged(reading))
-        found = [n for n in campaign.measured().warnings if n.code == "units-unlikely"]
-    assert bool(found) == told
-    assert all(n.level == "warning" and "Check the unit of lengths" in n.message for n in found)
+def test_lengths_that_cannot_be_meant_are_told(plan: Path, tmp_path: Path) -> None:
+    for unit, metres, told in (("mm", 1e-3, False), ("m", 1.0, True), ("um", 1e-6, True)):
+        with open_campaign(plan, "irb120", tmp_path / unit, listen=0, targets=["a"]) as campaign:
+            places = campaign.robot.world_poses(campaign.joints)[0] * 1e3  # as a number, in mm
+            for label, place in zip(campaign.session.labels, places, strict=True):
+                campaign._written(campaign.session.judged(Reading("a", 1.0, place * metres, label=label)))
+            found = [n for n in campaign.measured().warnings if n.code == "units-unlikely"]
+        assert bool(found) == told, unit
+        assert all(n.level == "warning" and "Check the unit of lengths" in n.message for n in found)
 
 
 def test_an_instrument_without_noise_reads_the_twin_that_is_simulated(planned: Path, tmp_path: Path) -> None:
@@ -467,11 +426,6 @@ def test_the_page_says_the_whole_call_and_no_token(plan: Path, tmp_path: Path) -
         assert "x" * 20 not in campaign.measured().command
 
 
-def test_a_word_that_the_job_does_not_know_is_no_keyword(plan: Path, tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match="'tracker'"):
-        open_campaign(plan, "irb120", tmp_path / "out", tracker=1)
-
-
 def test_a_point_of_which_no_reading_can_be_kept_is_left_out_after_twenty(plan: Path, tmp_path: Path) -> None:
     found = arm(plan, tmp_path / "out", most_settling=0.0, nests=[])
     assert found.session.aside_by_reason == {"not-settled": 60}
@@ -479,70 +433,65 @@ def test_a_point_of_which_no_reading_can_be_kept_is_left_out_after_twenty(plan: 
     assert found.files == ()
 
 
-def test_nothing_is_begun_before_everything_is_checked(plan: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError):
-        arm(plan, tmp_path / "out", command="")
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("given", "parameter", "word"),
-    [
-        ({"device": None}, "device, watch, listen", "nobody says"),
-        ({"device": None, "mapping": "m.yaml"}, "watch", "no folder is given, and `mapping` belongs to one"),
-        ({"device": None, "token": "x" * 20}, "listen", "no port is given, and `token` belongs to one"),
-        ({"device": None, "seed": 1}, "device", "no virtual device is given, and `seed` belongs to one"),
-        ({"device": None, "watch": "", "mapping": "m.yaml"}, "watch", "no folder is given; got ''"),
-        ({"listen": 0}, "device, listen", "one source"),
-        ({"device": "traker"}, "device", "Did you mean tracker"),
-        ({"mapping": "m.yaml"}, "mapping", "belongs to `watch`"),
-        ({"token": "x" * 20}, "token", "belongs to `listen`"),
-        ({"device": None, "listen": 0, "seed": 1}, "seed", "belongs to `device`"),
-        ({"device": None, "listen": 0}, "targets", "which targets"),
-        ({"device": None, "listen": 0, "targets": ["a"], "token": "short"}, "token", "keeps others out"),
-        ({"device": None, "listen": 0, "targets": ["n"]}, "targets, nests", "a target and for a nest"),
-        ({"device": None, "watch": "nowhere", "targets": ["a"]}, "mapping", "what the columns"),
-        ({"nests": [" "]}, "nests", "a name belongs here"),
-        ({"nests": ["n1", "n2", "n1"]}, "nests", "named twice; got 'n1'"),
-        ({"targets": ["1", 1]}, "targets", "named twice; got '1'"),
-        ({"targets": ["x"]}, "targets", "no such target"),
-    ],
+REFUSED: tuple[tuple[dict[str, Any], str, str], ...] = (
+    ({"device": None}, "device, watch, listen", "nobody says"),
+    ({"device": None, "mapping": "m.yaml"}, "watch", "no folder is given, and `mapping` belongs to one"),
+    ({"device": None, "token": "x" * 20}, "listen", "no port is given, and `token` belongs to one"),
+    ({"device": None, "seed": 1}, "device", "no virtual device is given, and `seed` belongs to one"),
+    ({"device": None, "watch": "", "mapping": "m.yaml"}, "watch", "no folder is given; got ''"),
+    ({"listen": 0}, "device, listen", "one source"),
+    ({"device": "traker"}, "device", "Did you mean tracker"),
+    ({"mapping": "m.yaml"}, "mapping", "belongs to `watch`"),
+    ({"token": "x" * 20}, "token", "belongs to `listen`"),
+    ({"device": None, "listen": 0, "seed": 1}, "seed", "belongs to `device`"),
+    ({"device": None, "listen": 0}, "targets", "which targets"),
+    ({"device": None, "listen": 0, "targets": ["a"], "token": "short"}, "token", "keeps others out"),
+    ({"device": None, "listen": 0, "targets": ["n"]}, "targets, nests", "a target and for a nest"),
+    ({"device": None, "watch": "nowhere", "targets": ["a"]}, "mapping", "what the columns"),
+    ({"nests": [" "]}, "nests", "a name belongs here"),
+    ({"nests": ["n1", "n2", "n1"]}, "nests", "named twice; got 'n1'"),
+    ({"targets": ["1", 1]}, "targets", "named twice; got '1'"),
+    ({"targets": ["x"]}, "targets", "no such target"),
+    ({"command": ""}, "command", ""),
 )
-def test_what_cannot_be_measured_is_refused(
-    plan: Path, tmp_path: Path, given: dict[str, Any], parameter: str, word: str
-) -> None:
-    with pytest.raises(InputError, match=word) as refusal:
-        arm(plan, tmp_path / "out", **given)
-    assert refusal.value.parameter == parameter
 
 
-@pytest.mark.parametrize("device", [device for device in DEVICES if device.name not in VIRTUAL], ids=lambda d: d.name)
-def test_a_device_that_goes_through_no_plan_says_why_and_what_to_do(device: Device, plan: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=device.no_plan) as refusal:
-        arm(plan, tmp_path / "out", device=device.name)
-    assert refusal.value.parameter == "device"
-    assert f"'truearm simulate' finds the postures of {device.name}" in str(refusal.value)
-    assert not (tmp_path / "out").exists()
-
-
-def test_folders_that_cannot_be_watched_are_refused(plan: Path, tmp_path: Path) -> None:
-    mapping, out = tmp_path / "out" / DATA, tmp_path / "out"
-    out.mkdir()
-    mapping.write_text(MAPPING)
-    given: dict[str, Any] = {"device": None, "targets": ["a"], "watch": out}
-    with pytest.raises(InputError, match="would be overwritten"):
-        arm(plan, out, mapping=mapping, **given)
-    moved = mapping.rename(tmp_path / "map.yaml")
-    with pytest.raises(InputError, match="is written to") as refusal:
-        arm(plan, out, mapping=moved, **given)
-    assert refusal.value.parameter == "out"
-
-
-def test_a_plan_with_a_configuration_twice_is_refused(plan: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_measured_is_refused_before_anything_is_begun(plan: Path, tmp_path: Path) -> None:
+    for given, parameter, word in REFUSED:
+        with pytest.raises(InputError) as refusal:
+            arm(plan, tmp_path / "out", **given)
+        assert word in str(refusal.value)
+        assert refusal.value.parameter == parameter
+        assert not (tmp_path / "out").exists()
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        with pytest.raises(InputError, match=r"another program listens on this port.*which is free") as refusal:
+            truearm.measure(plan, "irb120", out=tmp_path / "out", listen=taken.getsockname()[1], targets=["a"])
+        assert refusal.value.parameter == "listen"
+    assert not (tmp_path / "out" / LOG).exists()
     plan.write_text(MEASURED_PLAN + MEASURED_PLAN.splitlines()[1] + "\n")
     with pytest.raises(InputError, match="appears twice") as refusal:
         arm(plan, tmp_path / "out")
     assert refusal.value.parameter == "plan"
+
+
+def test_a_device_that_goes_through_no_plan_says_why_and_what_to_do(plan: Path, tmp_path: Path) -> None:
+    for device in (one for one in DEVICES if one.name not in VIRTUAL):
+        with pytest.raises(InputError, match=device.no_plan) as refusal:
+            arm(plan, tmp_path / "out", device=device.name)
+        assert refusal.value.parameter == "device"
+        assert f"'truearm simulate' finds the postures of {device.name}" in str(refusal.value)
+        assert not (tmp_path / "out").exists()
+
+
+def test_folders_that_cannot_be_watched_are_refused(plan: Path, watching: dict[str, Any]) -> None:
+    out = watching["out"]
+    out.mkdir()
+    with pytest.raises(InputError, match="is written to") as refusal:
+        truearm.measure(plan, "irb120", **watching | {"watch": out})
+    assert refusal.value.parameter == "out"
+    inside = watching["mapping"].rename(out / DATA)
+    with pytest.raises(InputError, match="would be overwritten"):
+        truearm.measure(plan, "irb120", **watching | {"mapping": inside})
 
 
 def test_a_virtual_robot_comes_from_the_stops_of_the_plan(plan: Path, tmp_path: Path) -> None:
@@ -562,3 +511,63 @@ def test_a_virtual_robot_comes_from_the_stops_of_the_plan(plan: Path, tmp_path: 
     np.testing.assert_allclose(places[0], places[1], atol=1e-12)
     assert came.data is not None
     assert came.data.number.tolist() == list(range(1, 2 * len(table), 2))
+
+
+@pytest.fixture
+def command(truearm: Truearm) -> Truearm:
+    return truearm
+
+
+def test_one_line_a_reading_then_what_came_of_it(command: Truearm, plan: Path, tmp_path: Path) -> None:
+    words = ("measure", plan, "irb120", "--device", "measurement-arm", "--out", tmp_path / "out")
+    run = command(*words, "--most-deviation", "0.5")
+    assert run.code == 0
+    first, *_, last = run.out.splitlines()
+    assert first.startswith("   1  P1 nest  ")
+    assert " mm  deviation 0.0" in first
+    assert last == f"Written to {tmp_path / 'out'}: measurements.csv, measure.html, and the log readings.csv"
+    again = command(*words, "--most-deviation", "0.5", "--json")
+    summary = json.loads(again.out)
+    assert list(summary)[2:6] == ["finished", "configurations", "targets", "kept"]
+    assert (summary["finished"], summary["kept"]) == (True, {"targets": 3, "nests": 0})
+    assert "Going on after 3 entries" in again.err
+    other = command(*words)
+    assert other.code == 2
+    assert "limit of what is kept" in other.err
+
+
+def test_the_token_that_is_given_stands_in_no_file_and_no_line(command: Truearm, plan: Path, tmp_path: Path) -> None:
+    token = "this-is-the-secret-of-the-test"
+    given = ("--listen", 0, "--token", token, "--target", "a", "--timeout", 0)
+    run = command("measure", plan, "irb120", *given, "--out", tmp_path / "out")
+    assert run.code == 0
+    assert "Listening on 127.0.0.1 port" in run.out
+    assert token not in run.out + run.err
+    assert all(token.encode() not in path.read_bytes() for path in (tmp_path / "out").iterdir())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="another kind of signals")
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
+def test_a_process_that_is_stopped_leaves_its_log_and_goes_on(
+    command: Truearm, plan: Path, watching: dict[str, Any], stop: signal.Signals
+) -> None:
+    inside, out = watching["watch"], watching["out"]
+    (inside / "p.csv").write_text("Pose,Point,X,Y,Z\nP1,a,1,2,3\nP2,a,1,2,4\n")
+    words = ["measure", plan, "irb120", "--watch", inside, "--map", watching["mapping"], "--out", out, "--target", "a"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "truearm", *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    log, until = out / LOG, time.monotonic() + 60.0
+    while time.monotonic() < until and not (log.exists() and log.read_text().count("\n") == 3):
+        time.sleep(0.05)
+    os.kill(process.pid, stop)
+    printed, _ = process.communicate(timeout=60.0)
+    assert log.read_text().count("\n") == 3
+    if stop == signal.SIGINT:
+        assert process.returncode == 0
+        assert "Warning (unfinished)" in printed
+        assert (out / DATA).exists()
+    (inside / "q.csv").write_text("Pose,Point,X,Y,Z\nP3,a,1,2,5\n")
+    run = command(*words)
+    assert run.code == 0
+    assert "3 of 3 configurations measured" in run.out

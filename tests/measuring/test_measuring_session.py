@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text, read_csv
 from truearm.engine.data.readers.rows import Configurations
 from truearm.measuring.campaign import nest_drift, session_notices
@@ -33,6 +34,18 @@ def taken(of: Session, name: str, label: str | None = None, *, x: float | None =
     return entry
 
 
+def told(of: Session, code: str) -> tuple[str, str]:
+    """Return the level and the words of the one notice with this code."""
+    (notice,) = [notice for notice in session_notices(of) if notice.code == code]
+    return notice.level, notice.message
+
+
+def kept(of: Session, stops: Configurations | None = None) -> Dataset:
+    data = kept_readings(of, replace(plan(of.labels), before=stops), "kept")
+    assert data is not None
+    return data
+
+
 def through(of: Session, most: int = 200) -> list[tuple[str, str, str]]:
     """Measure whatever comes next until nothing is left, and return what was asked for."""
     asked: list[tuple[str, str, str]] = []
@@ -45,9 +58,6 @@ def through(of: Session, most: int = 200) -> list[tuple[str, str, str]]:
 def plan(labels: tuple[str, ...] = LABELS) -> Configurations:
     joints = np.radians(10.0 * np.arange(1.0, len(labels) + 1))[:, None] * [1.0, 2.0]
     return Configurations(labels, joints, ("revolute", "revolute"), np.arange(len(labels)))
-
-
-# -- what comes next -------------------------------------------------------------------------------------------
 
 
 def test_targets_come_in_the_order_of_the_plan_and_nests_first_along_the_way_and_last() -> None:
@@ -63,11 +73,8 @@ def test_targets_come_in_the_order_of_the_plan_and_nests_first_along_the_way_and
     ]
     assert of.done
     assert (of.outstanding, of.missed_rounds) == (0, 0)
-
-
-def test_a_plan_of_one_configuration_has_nests_before_and_after() -> None:
-    of = Session(("P1",), ("a",), ("n",), 10, QUALITY)
-    assert [name for _, _, name in through(of)] == ["n", "a", "n"]
+    short = Session(("P1",), ("a",), ("n",), 10, QUALITY)
+    assert [name for _, _, name in through(short)] == ["n", "a", "n"]
 
 
 def test_a_reading_that_names_no_configuration_belongs_to_the_first_that_is_open() -> None:
@@ -83,64 +90,48 @@ def test_a_reading_of_another_configuration_is_kept_where_it_belongs() -> None:
     assert step is not None
     assert step.label == "P1"
     taken(of, "a", "P1")
-    (notice,) = [n for n in session_notices(of) if n.code == "other-order"]
-    assert "P1" in notice.message
-    assert notice.level == "note"
-    data = kept_readings(of, plan(), "kept")
-    assert data is not None
+    level, words = told(of, "other-order")
+    assert level == "note"
+    assert "P1" in words
+    data = kept(of)
     assert data.labels == ("P3", "P1")
     assert "order" in csv_text(data)
     assert data.number is not None
     assert data.number.tolist() == [0, 1]
-
-
-def test_stops_before_the_configurations_count_in_the_order() -> None:
+    # Stops before the configurations count in the order.
     of = session(targets=("a",))
-    for label in LABELS:
-        taken(of, "a", label)
-    data = kept_readings(of, replace(plan(), before=plan()), "kept")
-    assert data is not None
+    through(of)
+    data = kept(of, plan())
     assert data.number is not None
     assert data.approach is not None
     assert data.number.tolist() == list(range(1, 2 * len(LABELS), 2))
     assert not data.approach.any()
 
 
-def test_nests_that_are_passed_over_are_counted() -> None:
+def test_nests_that_are_passed_over_or_hidden_are_counted_and_told() -> None:
     of = session(targets=("a",), nests=("n",), every=2)
     for label in LABELS[:3]:
         taken(of, "a", label)
     assert of.missed_rounds == 1
-    assert [n.code for n in session_notices(of) if n.level == "warning"] == ["nests-missed"]
+    assert told(of, "nests-missed")[0] == "warning"
     step = of.next
     assert step is not None
     assert step.names == ("n",)  # the second round is still to be measured
-
-
-def test_a_nest_that_is_hidden_is_told_with_its_place_and_the_round_is_not_whole() -> None:
     of = session(targets=("a",), nests=("n1", "n2"), every=2)
     of.add(of.leave_out("P1", "n1", "the arm is in the line of sight"))
     through(of)
-    assert of.done
-    assert of.missed_rounds == 1
-    (notice,) = [n for n in session_notices(of) if n.level == "warning"]
-    assert notice.code == "nests-missed"
-    assert "In 1 of 3 rounds" in notice.message
-    assert "Left out: n1 at P1 (the arm is in the line of sight)." in notice.message
-    assert of.left_out == ()
+    assert (of.done, of.missed_rounds, of.left_out) == (True, 1, ())
+    level, words = told(of, "nests-missed")
+    assert level == "warning"
+    assert "In 1 of 3 rounds" in words
+    assert "Left out: n1 at P1 (the arm is in the line of sight)." in words
 
 
 def test_a_plan_that_says_what_is_read_asks_for_nothing_else_and_takes_it_all_the_same() -> None:
     of = Session(LABELS, ("a", "b"), (), 2, QUALITY, {"P1": ("a",), "P2": ("b",), "P3": ("a", "b"), "P4": ("b",)})
     assert (of.outstanding, of.planned) == (5, 5)
     assert taken(of, "b", "P1").kept
-    assert [(label, name) for _, label, name in through(of)] == [
-        ("P1", "a"),
-        ("P2", "b"),
-        ("P3", "a"),
-        ("P3", "b"),
-        ("P4", "b"),
-    ]
+    assert [f"{label}/{name}" for _, label, name in through(of)] == ["P1/a", "P2/b", "P3/a", "P3/b", "P4/b"]
     assert (of.done, len(of.kept), of.left_out) == (True, 6, ())
 
 
@@ -158,73 +149,51 @@ def test_what_is_left_out_is_not_asked_for_but_may_come_all_the_same() -> None:
 
 def test_targets_left_out_at_most_configurations_are_told_and_one_of_two_seen_at_each_is_not() -> None:
     of = session()
-    for label in LABELS:
-        of.add(of.leave_out(label, "b", "the tracker does not see it"))
-    for label in LABELS[:2]:
-        of.add(of.leave_out(label, "a", "the tracker does not see it"))
+    for label, name in (*((label, "b") for label in LABELS), ("P1", "a"), ("P2", "a")):
+        of.add(of.leave_out(label, name, "the tracker does not see it"))
     assert "many-left-out" not in {n.code for n in session_notices(of)}
     of.add(of.leave_out("P3", "a", "the tracker does not see it"))
-    (notice,) = [n for n in session_notices(of) if n.code == "many-left-out"]
-    assert notice.level == "warning"
-    assert "At 3 of 4 configurations" in notice.message
-    assert "7 of 8 readings of targets are missing" in notice.message
+    level, words = told(of, "many-left-out")
+    assert level == "warning"
+    assert "At 3 of 4 configurations" in words
+    assert "7 of 8 readings of targets are missing" in words
     taken(of, "a", "P3")
     assert "many-left-out" not in {n.code for n in session_notices(of)}
 
 
-# -- what a reading is worth -----------------------------------------------------------------------------------
+FAULTS: dict[str, dict[str, Any]] = {
+    "beam-break": {"breaks": 2},
+    "few-samples": {"samples": 4},
+    "not-settled": {"settling": 6e-5},
+    "scatter": {"deviation": 4e-5},
+    "unknown-configuration": {"label": "P9"},
+    "unknown-name": {"name": "c"},
+}
 
 
-@pytest.mark.parametrize(
-    ("reason", "more"),
-    [
-        ("beam-break", {"breaks": 2}),
-        ("few-samples", {"samples": 4}),
-        ("not-settled", {"settling": 6e-5}),
-        ("scatter", {"deviation": 4e-5}),
-        ("unknown-configuration", {"label": "P9"}),
-    ],
-)
-def test_every_fault_of_the_instrument_sets_a_reading_aside_and_it_is_asked_for_again(
-    reason: str, more: dict[str, Any]
-) -> None:
-    of = session()
-    assert taken(of, "a", **more).reason == reason
-    assert of.aside_by_reason == {reason: 1}
-    step = of.next
-    assert step is not None
-    assert (step.label, step.names[0]) == ("P1", "a")
-    assert taken(of, "a").kept
-
-
-def test_a_name_that_is_not_known_is_set_aside() -> None:
-    assert taken(session(), "c").reason == "unknown-name"
+def test_every_fault_of_the_instrument_sets_a_reading_aside_and_it_is_asked_for_again() -> None:
+    for reason in FAULTS:
+        of = session()
+        assert taken(of, **{"name": "a", **FAULTS[reason]}).reason == reason, reason
+        assert of.aside_by_reason == {reason: 1}, reason
+        step = of.next
+        assert step is not None, reason
+        assert (step.label, step.names[0]) == ("P1", "a"), reason
+        assert taken(of, "a").kept, reason
 
 
 def test_a_second_reading_never_replaces_one_that_is_kept() -> None:
     of = session()
-    first = taken(of, "a", "P1")
+    first = taken(of, "a", "P1", x=0.5)
     again = taken(of, "a", "P1")
     assert (again.reason, again.words) == ("measured-already", "reading 1")
+    assert taken(of, "a", "P2", x=0.5).reason == "copy"  # of another place, to the last digit
     of.add(of.set_aside(first.number, "the nest was not clean"))
     assert of.reason_of(first) == "operator"
     third = taken(of, "a", "P1")
     assert third.kept
     assert [entry.number for entry in of.kept] == [third.number]
-    assert of.aside_by_reason == {"measured-already": 1, "operator": 1}
-
-
-def test_a_reading_that_repeats_another_place_to_the_last_digit_is_none() -> None:
-    of = session(targets=("a",))
-    taken(of, "a", x=0.5)
-    assert taken(of, "a", x=0.5).reason == "copy"
-
-
-def test_a_row_without_a_reading_leaves_its_target_out() -> None:
-    of = session()
-    entry = taken(of, "b", "P1", x=np.nan)
-    assert entry.reason == "no-reading"
-    assert of.left_out == (("P1", "b"),)
+    assert of.aside_by_reason == {"measured-already": 1, "copy": 1, "operator": 1}
 
 
 def test_every_reading_stays_with_its_reason() -> None:
@@ -232,60 +201,50 @@ def test_every_reading_stays_with_its_reason() -> None:
     for name, breaks in (("a", 0), ("a", 1), ("zz", 0), ("b", 0)):
         taken(of, name, breaks=breaks)
     assert [entry.reason for entry in of.entries] == ["", "beam-break", "unknown-name", ""]
-    assert {entry.reason for entry in of.entries} <= {"", *REASONS}
+    assert {"beam-break", "unknown-name"} <= {*REASONS}
     drawn = of.drawn()
     assert drawn.position.shape == (4, 3)
     assert drawn.kept.tolist() == [entry.kept for entry in of.entries]
     assert len(drawn.names) == len(drawn.labels) == len(drawn.reasons) == len(drawn.time) == 4
+    # One that does not follow is none of this session.
+    other = session()
+    with pytest.raises(InputError, match="does not follow"):
+        other.add(of.entries[1])
+    other.add(of.entries[0])
+    with pytest.raises(InputError, match="does not follow"):
+        other.add(Entry(2, "aside", "P1", "b", reason="operator", of=1))
 
 
-def test_readings_of_which_nothing_is_told_are_kept_and_counted() -> None:
+def test_readings_of_which_nothing_is_told_are_kept_and_a_clock_that_goes_back_is_told() -> None:
     of = session()
     taken(of, "a", samples=None, deviation=None, settling=None)
-    (notice,) = [n for n in session_notices(of) if n.code == "not-judged"]
-    assert "1 of 1" in notice.message
-    assert notice.level == "note"
-
-
-def test_a_clock_that_goes_back_is_told_by_the_number() -> None:
-    of = session()
-    taken(of, "a")
+    level, words = told(of, "not-judged")
+    assert level == "note"
+    assert "1 of 1" in words
     taken(of, "b", time=-5.0)
-    (notice,) = [n for n in session_notices(of) if n.code == "clock-back"]
-    assert "reading 2" in notice.message
+    assert "reading 2" in told(of, "clock-back")[1]
 
 
-@pytest.mark.parametrize(
-    ("call", "parameter"),
-    [
-        (lambda of: of.set_aside(1), "number"),
-        (lambda of: of.set_aside(2), "number"),
-        (lambda of: of.leave_out("P7", "a"), "label"),
-        (lambda of: of.leave_out("P1", "c"), "name"),
-        (lambda of: of.leave_out("P1", "b"), "name"),
-        (lambda of: of.leave_out("P2", "b", "two\nlines"), "words"),
-    ],
-)
-def test_words_of_the_operator_that_cannot_be_are_refused(call: Any, parameter: str) -> None:
+def test_words_of_the_operator_that_cannot_be_are_refused() -> None:
     of = session()
     taken(of, "a", breaks=1)
     taken(of, "b")
-    if parameter == "number" and call is not None:
-        of.add(of.set_aside(2))
+    of.add(of.set_aside(2))
+    calls: tuple[tuple[Callable[[], Entry], str], ...] = (
+        (lambda: of.set_aside(1), "number"),
+        (lambda: of.set_aside(2), "number"),
+        (lambda: of.leave_out("P7", "a"), "label"),
+        (lambda: of.leave_out("P1", "c"), "name"),
+        (lambda: of.leave_out("P2", "b", "two\nlines"), "words"),
+    )
+    for number, (call, parameter) in enumerate(calls):
+        with pytest.raises(InputError) as refusal:
+            call()
+        assert refusal.value.parameter == parameter, number
+    taken(of, "b", "P1")
     with pytest.raises(InputError) as refusal:
-        call(of)
-    assert refusal.value.parameter == parameter
-
-
-def test_entries_that_do_not_follow_are_refused() -> None:
-    of, other = session(), session()
-    first = taken(other, "a")
-    taken(other, "b")
-    with pytest.raises(InputError, match="does not follow"):
-        of.add(other.entries[1])
-    of.add(first)
-    with pytest.raises(InputError, match="does not follow"):
-        of.add(Entry(2, "aside", "P1", "b", reason="operator", of=1))
+        of.leave_out("P1", "b")
+    assert refusal.value.parameter == "name"
 
 
 def test_the_figures_of_a_dwell() -> None:
@@ -299,14 +258,10 @@ def test_the_figures_of_a_dwell() -> None:
     assert dwell_figures(samples)[2] == pytest.approx(5e-5, rel=0.02)
 
 
-# -- what comes of it ------------------------------------------------------------------------------------------
-
-
 def test_kept_readings_are_a_file_that_reads_back(tmp_path: Any) -> None:
     of = session(nests=("n",))
     through(of)
-    data = kept_readings(of, plan(), "kept")
-    assert data is not None
+    data = kept(of)
     assert (data.configurations, len(data.target)) == (4, 8)
     assert data.references is not None
     assert data.references.targets == ("n",)
@@ -315,14 +270,16 @@ def test_kept_readings_are_a_file_that_reads_back(tmp_path: Any) -> None:
     assert csv_text(read_csv(path)) == path.read_text()
 
 
-def test_left_out_targets_are_missing_and_configurations_never_reached_are_not_there() -> None:
+def test_what_was_not_measured_is_missing_or_not_there() -> None:
     of = session()
+    taken(of, "a", breaks=1)
+    assert kept_readings(of, plan(), "kept") is None
     taken(of, "a")
-    of.add(of.leave_out("P1", "b"))
+    assert taken(of, "b", "P1", x=np.nan).reason == "no-reading"
+    assert of.left_out == (("P1", "b"),)
     taken(of, "b")
-    data = kept_readings(of, plan(), "kept")
-    assert data is not None
-    assert data.labels == ("P1", "P2")
+    data = kept(of)
+    assert data.labels == ("P1", "P2")  # nobody came to the others
     assert data.has_position.tolist() == [True, False, False, True]
 
 
@@ -332,16 +289,9 @@ def test_a_configuration_to_which_the_robot_comes_again_has_visits() -> None:
     taken(of, "b", "P1", breaks=1)
     taken(of, "a", "P2")
     taken(of, "b", "P1")
-    data = kept_readings(of, plan(), "kept")
-    assert data is not None
+    data = kept(of)
     assert data.visit is not None
     assert data.visit.tolist() == [1, 2, 1, 1]
-
-
-def test_nothing_kept_is_no_data() -> None:
-    of = session()
-    taken(of, "a", breaks=1)
-    assert kept_readings(of, plan(), "kept") is None
 
 
 def test_the_deviation_is_the_instruments_or_that_of_the_nests_and_never_that_of_a_dwell() -> None:
@@ -358,13 +308,16 @@ def test_the_deviation_is_the_instruments_or_that_of_the_nests_and_never_that_of
         of.add(of.judged(Reading(step.names[0], 1.0, place, label=step.label, deviation=1e-6)))
     found = stated_sigma(of).value
     assert found == pytest.approx(2e-5, rel=0.1)
-    data = kept_readings(of, plan(tuple(f"P{k}" for k in range(200))), "kept")
-    assert data is not None
+    data = kept(of)
     assert data.sigma is not None
     assert set(data.sigma.tolist()) == {found}
 
 
 def test_the_drift_of_nests_is_what_they_moved() -> None:
+    without = session()
+    taken(without, "a")
+    assert nest_drift(without) is None
+    assert told(without, "no-nests")
     of = session(targets=("a",), nests=("n1", "n2"), every=1)
     moved = 0.0
     while (step := of.next) is not None:
@@ -402,10 +355,3 @@ def test_one_nest_tells_its_scatter_from_round_to_round_and_a_drift_beside_it() 
     seldom = nest_drift(few)
     assert seldom is not None
     assert seldom.noise() is None
-
-
-def test_no_nest_no_drift() -> None:
-    of = session()
-    taken(of, "a")
-    assert nest_drift(of) is None
-    assert [n.code for n in session_notices(of)] == ["no-nests"]

@@ -1,4 +1,7 @@
-"""The log of readings survives a kill at any moment, and takes nothing that was not written by it."""
+"""The log of readings survives a kill at any moment, and takes nothing that was not written by it.
+
+What a campaign was measured with is read and shown, and what is missing is said.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,8 @@ import pytest
 from tests.killing import killed, operations
 
 from truearm.engine.base.errors import InputError
-from truearm.measuring.reading_log import LOG, ReadingLog
-from truearm.measuring.session import REASONS, Entry, Reading
+from truearm.measuring.reading_log import LOG, About, ReadingLog, read_about
+from truearm.measuring.session import Entry, Reading
 
 
 def entry(number: int, *, reason: str = "") -> Entry:
@@ -75,64 +78,56 @@ def read(folder: Path) -> tuple[Entry, ...]:
     return log.entries
 
 
-def same_as(expected: tuple[Entry, ...], found: tuple[Entry, ...]) -> bool:
-    return len(found) == len(expected) and all(same(a, b) for a, b in zip(found, expected, strict=True))
-
-
 def test_what_is_written_is_read_again_to_the_last_digit(tmp_path: Path) -> None:
     write(tmp_path)
-    assert same_as(ENTRIES, read(tmp_path))
+    found = read(tmp_path)
+    assert len(found) == len(ENTRIES)
+    assert all(same(a, b) for a, b in zip(found, ENTRIES, strict=True))
 
 
-@pytest.mark.parametrize("lost", [1, 9, 10, 60])
-def test_a_part_of_a_line_at_the_end_is_cut_off(tmp_path: Path, lost: int) -> None:
+def test_a_part_of_a_line_at_the_end_is_cut_off(tmp_path: Path) -> None:
     write(tmp_path)
     path = tmp_path / LOG
     whole = path.read_bytes()
-    path.write_bytes(whole[:-lost])
-    log = ReadingLog(tmp_path)
-    assert log.torn > 0
-    assert len(log.entries) in (len(ENTRIES) - 1, len(ENTRIES) - 2)
-    log.close()
-    write(tmp_path)
-    assert path.read_bytes() == whole
+    for lost in (1, 9, 10, 60):
+        path.write_bytes(whole[:-lost])
+        log = ReadingLog(tmp_path)
+        log.close()
+        assert log.torn > 0, lost
+        assert len(log.entries) in (len(ENTRIES) - 1, len(ENTRIES) - 2)
+        write(tmp_path)
+        assert path.read_bytes() == whole
 
 
-def test_a_line_that_was_changed_is_refused_with_its_number(tmp_path: Path) -> None:
+def test_a_line_that_was_changed_or_says_nothing_is_refused_with_its_number(tmp_path: Path) -> None:
     write(tmp_path)
     path = tmp_path / LOG
     lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join([*lines[:2], lines[2].replace("P2", "P3", 1), *lines[3:]]))
-    with pytest.raises(InputError, match="line 3: this line is not as it was written"):
-        ReadingLog(tmp_path)
-
-
-@pytest.mark.parametrize("content", ["a,b\n1,2\n", "configuration\n"])
-def test_another_file_is_no_log_and_stays(tmp_path: Path, content: str) -> None:
-    (tmp_path / LOG).write_text(content)
-    with pytest.raises(InputError, match="no log of readings"):
-        ReadingLog(tmp_path)
-    assert (tmp_path / LOG).read_text() == content
-
-
-def test_a_link_or_a_folder_is_no_log(tmp_path: Path) -> None:
-    (tmp_path / "elsewhere").write_text("")
-    (tmp_path / LOG).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(InputError, match="this is none"):
-        ReadingLog(tmp_path)
-    (tmp_path / LOG).unlink()
-    (tmp_path / LOG).mkdir()
-    with pytest.raises(InputError, match="this is none"):
-        ReadingLog(tmp_path)
-
-
-def test_a_line_that_says_nothing_is_refused_although_its_checksum_fits(tmp_path: Path) -> None:
-    write(tmp_path)
     body = "6,guess,,P1,a,target,,,,,,,,,,,,,,,,,,"
-    with (tmp_path / LOG).open("a") as stream:
-        stream.write(f"{body},{zlib.crc32(body.encode()):08x}\n")
-    with pytest.raises(InputError, match="line 7: this line cannot be understood"):
-        ReadingLog(tmp_path)
+    for changed, said in (
+        ([*lines[:2], lines[2].replace("P2", "P3", 1), *lines[3:]], "line 3: this line is not as it was written"),
+        ([*lines, f"{body},{zlib.crc32(body.encode()):08x}\n"], "line 7: this line cannot be understood"),
+    ):
+        path.write_text("".join(changed))
+        with pytest.raises(InputError, match=said):
+            ReadingLog(tmp_path)
+
+
+def test_what_is_no_log_stays(tmp_path: Path) -> None:
+    path = tmp_path / LOG
+    for content in ("a,b\n1,2\n", "configuration\n"):
+        path.write_text(content)
+        with pytest.raises(InputError, match="no log of readings"):
+            ReadingLog(tmp_path)
+        assert path.read_text() == content
+    path.unlink()
+    (tmp_path / "elsewhere").write_text("")
+    path.symlink_to(tmp_path / "elsewhere")
+    for _ in ("a link", "a folder"):
+        with pytest.raises(InputError, match="this is none"):
+            ReadingLog(tmp_path)
+        path.unlink(missing_ok=True) if path.is_symlink() else path.rmdir()
+        path.mkdir()
 
 
 def test_a_disk_that_does_not_take_a_line_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -149,23 +144,15 @@ def test_a_disk_that_does_not_take_a_line_is_told(tmp_path: Path, monkeypatch: p
         ReadingLog(tmp_path / "nowhere")
 
 
-def test_one_process_at_a_time_has_it(tmp_path: Path) -> None:
+def test_one_process_at_a_time_has_it_and_names_that_would_break_a_line_are_escaped(tmp_path: Path) -> None:
     log = ReadingLog(tmp_path)
     with pytest.raises(InputError, match="another process is measuring"):
         ReadingLog(tmp_path)
-    log.close()
-    ReadingLog(tmp_path).close()
-
-
-def test_names_that_would_break_a_line_are_escaped(tmp_path: Path) -> None:
-    log = ReadingLog(tmp_path)
     odd = Reading("a\nb", 0.0, np.full(3, np.nan))
     log.append(Entry(1, "reading", "", odd.name, reading=odd, reason="unknown-name"))
     log.close()
     (found,) = read(tmp_path)
-    assert found.name == r"a\nb"
-    assert found.reason in REASONS
-    assert found.label == ""
+    assert (found.name, found.reason, found.label) == (r"a\nb", "unknown-name", "")
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="a process cannot copy itself here")
@@ -191,3 +178,53 @@ def test_a_kill_at_any_of_twenty_moments_damages_nothing(tmp_path: Path) -> None
         write(folder)
         assert (folder / LOG).read_bytes() == whole
     assert len(lengths) > 2
+
+
+WHOLE = """\
+truearm: truearm-about/1
+units: {length: mm, temperature: degC, pressure: hPa, humidity: percent}
+instrument: {name: tracker of the hall, serial: "750123"}
+robot: {serial: "120-501234"}
+reflector: {radius: 19.05, offset: 0.0}
+environment:
+  - {at: start, temperature: 20.4, pressure: 1013.2, humidity: 45}
+  - {at: end, temperature: 21.0}
+"""
+
+
+def test_everything_that_is_said_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "about.yaml"
+    path.write_text(WHOLE)
+    about = read_about(path)
+    assert about.missing == []
+    assert about.notices() == []
+    rows = dict(about.rows())
+    assert rows["serial number of the robot"] == "120-501234"
+    assert rows["radius of the reflector"] == "19.05 mm"
+    assert rows["air, start"] == "20.4 degC, 1013.2 hPa, 45 percent"
+    assert rows["air, end"] == "21 degC"
+
+
+def test_what_nobody_said_is_named() -> None:
+    (notice,) = About(instrument_serial="7").notices()
+    assert (notice.code, notice.level) == ("not-said", "note")
+    assert "serial number of the instrument" not in notice.message
+    for word in ("serial number of the robot", "radius of the reflector", "temperature of the air"):
+        assert word in notice.message
+
+
+def test_what_cannot_be_meant_is_refused_with_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "about.yaml"
+    for old, new, word in (
+        ("radius: 19.05", "radius: 1905", "reflector.radius"),
+        ("radius: 19.05", "radius: 0", "reflector.radius"),
+        ("temperature: 20.4", "temperature: 293.5", r"environment\[1\].temperature"),
+        ("pressure: 1013.2", "pressure: 101320", r"environment\[1\].pressure"),
+        ("humidity: 45", "humidity: 145", r"environment\[1\].humidity"),
+        ("length: mm", "length: furlong", "units.length"),
+        ("serial:", "seriel:", "seriel"),
+        ("at: start", 'at: "st\\x07art"', "one line of text"),
+    ):
+        path.write_text(WHOLE.replace(old, new))
+        with pytest.raises(InputError, match=word):
+            read_about(path)

@@ -101,10 +101,19 @@ def test_rows_are_read_as_they_come_and_half_a_line_waits(watched: Folder) -> No
     assert reading.origin == "points.csv, line 3"
 
 
-def test_a_mapping_needs_no_joints_where_the_plan_has_them(made: Callable[..., Folder]) -> None:
+def test_a_mapping_needs_no_joints_where_the_plan_has_them(made: Callable[..., Folder], tmp_path: Path) -> None:
     watched = made(MAPPING.replace("joints: {file: plan.csv}\n", ""))
     watched.write(HEADER + row("P1", "n1") + row("P1", "a"))
     assert watched.step() == ["P1/n1", "P1/a"]
+    # But other joints, or a sheet, do not go with a plan and with text.
+    watched.campaign.close()
+    for old, new, where in (
+        ("joints: {file: plan.csv}", "joints: {columns: [X], unit: deg}", "joints"),
+        ("length_unit: mm", "length_unit: mm\nlayout: {sheet: Points}", "layout.sheet"),
+    ):
+        with pytest.raises(InputError) as refusal:
+            Folder(tmp_path, MAPPING.replace(old, new).replace("x: X", "x: XX"))
+        assert str(refusal.value.where).endswith(where)
 
 
 def test_a_thread_that_writes_is_followed_to_the_end(watched: Folder) -> None:
@@ -147,8 +156,13 @@ def test_every_fault_that_the_table_tells_sets_its_row_aside(watched: Folder) ->
 def test_old_ends_of_lines_and_windows_ones_are_lines(watched: Folder) -> None:
     text = HEADER + row("P1", "a") + row("P2", "a", 2.0)
     watched.write(text.replace("\n", "\r"), "old.csv")
-    watched.write((HEADER + row("P3", "a", 3.0)).replace("\n", "\r\n"), "windows.csv")
-    assert sorted(watched.step()) == ["P1/a", "P2/a", "P3/a"]
+    assert sorted(watched.step()) == ["P1/a", "P2/a"]
+    # A break of two characters may come in two pieces.
+    watched.write(HEADER.replace("\n", "\r\n") + row("P3", "a", 3.0).rstrip("\n") + "\r", "windows.csv")
+    assert watched.step() == ["P3/a"]
+    watched.write("\n" + row("P3", "n1", 2.0).replace("\n", "\r\n"), "windows.csv")
+    assert watched.step() == ["P3/n1"]
+    assert watched.codes == []
 
 
 def test_going_on_passes_over_what_the_log_holds(watched: Folder) -> None:
@@ -158,11 +172,6 @@ def test_going_on_passes_over_what_the_log_holds(watched: Folder) -> None:
     watched.write(row("P3", "a", 3.0))
     assert watched.step() == ["P3/a"]
     assert len(watched.campaign.session) == 3
-
-
-def test_a_log_of_another_plan_is_refused(watched: Folder) -> None:
-    watched.write(HEADER + row("P1", "a"))
-    watched.step()
     watched.campaign.close()
     other = Session(("Q1", "Q2"), ("a",), ("n1",), 2, Quality())
     with pytest.raises(InputError, match="does not belong to this plan"):
@@ -207,18 +216,25 @@ def test_a_file_of_another_encoding_or_with_other_columns_is_told_until_it_is_ri
     (watched.inside / "other.csv").write_text("Pose,Name,X,Y,Z\nP1,a,1,2,3\n")
     assert watched.step() == []
     (notice,) = watched.campaign.source.notices
+    assert (notice.code, notice.level) == ("not-read", "note")
     assert "not utf-8 text" in notice.message
     assert "no such column" in notice.message
     (watched.inside / "other.csv").unlink()
+    watched.write(row("P1", "a") + row("P2", "a", 2.0), mode="w")  # without a header
+    assert watched.step() == []
+    assert ".." not in watched.campaign.source.notices[0].message
     watched.write(HEADER + row("P1", "a"), mode="w")
     assert watched.step() == ["P1/a"]
     assert "utf-8" not in "".join(n.message for n in watched.campaign.source.notices)
 
 
-def test_a_folder_that_goes_away_is_told(watched: Folder) -> None:
+def test_a_folder_that_goes_away_is_told_and_one_that_is_not_there_is_refused(watched: Folder) -> None:
     watched.inside.rmdir()
     assert watched.step() == []
     assert "the folder is gone" in watched.campaign.source.notices[0].message
+    with pytest.raises(InputError, match="no such folder") as refusal:
+        WatchedFolder(watched.place / "nowhere", watched.place / "map.yaml", LABELS)
+    assert refusal.value.parameter == "watch"
 
 
 def test_wide_tables_without_labels_count_their_rows(made: Callable[..., Folder]) -> None:
@@ -259,39 +275,3 @@ joints: {file: plan.csv}
     assert reading.sigma == pytest.approx(2e-5)
     assert reading.time == 7.0
     assert "length 1" in of.campaign.source.told()[0]
-
-
-@pytest.mark.parametrize(
-    ("change", "where"),
-    [
-        (("joints: {file: plan.csv}", "joints: {columns: [X], unit: deg}"), "joints"),
-        (("length_unit: mm", "length_unit: mm\nlayout: {sheet: Points}"), "layout.sheet"),
-    ],
-)
-def test_mappings_that_cannot_be_used_here_are_refused(tmp_path: Path, change: tuple[str, str], where: str) -> None:
-    with pytest.raises(InputError) as refusal:
-        Folder(tmp_path, MAPPING.replace(*change).replace("x: X", "x: XX"))
-    assert str(refusal.value.where).endswith(where)
-
-
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "map.yaml").write_text(MAPPING)
-    with pytest.raises(InputError, match="no such folder") as refusal:
-        WatchedFolder(tmp_path / "nowhere", tmp_path / "map.yaml", LABELS)
-    assert refusal.value.parameter == "watch"
-
-
-def test_a_line_break_of_two_characters_may_come_in_two_pieces(watched: Folder) -> None:
-    watched.write(HEADER.replace("\n", "\r\n") + row("P1", "a").rstrip("\n") + "\r")
-    assert watched.step() == ["P1/a"]
-    watched.write("\n" + row("P2", "a", 2.0).replace("\n", "\r\n"))
-    assert watched.step() == ["P2/a"]
-    assert watched.codes == []
-
-
-def test_a_file_that_has_no_header_is_named_in_whole_sentences(watched: Folder) -> None:
-    watched.write(row("P1", "a") + row("P2", "a", 2.0))
-    assert watched.step() == []
-    (notice,) = watched.campaign.source.notices
-    assert (notice.code, notice.level) == ("not-read", "note")
-    assert ".." not in notice.message

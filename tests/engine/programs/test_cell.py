@@ -43,10 +43,19 @@ def test_a_frame_in_the_world_is_seen_from_the_base(tmp_path: Path) -> None:
     np.testing.assert_allclose(placed.identified.rotation @ [0, 1, 0], [1, 0, 0], atol=1e-15)
 
 
-def test_own_base_and_flange_are_the_frames_without_a_name(tmp_path: Path) -> None:
-    cell = read(tmp_path, "tools:\n  flange: {of: flange}\nframes:\n  Base: {of: base, translation: [1, 2, 3]}\n")
+def test_names_of_tools_and_frames(tmp_path: Path) -> None:
+    """Own base and flange have none, and a number is one."""
+    cell = read(
+        tmp_path,
+        "tools:\n  flange: {of: flange}\n  3: {of: flange}\n"
+        '  tProbe: {of: flange, target: "1", controller: {translation: [0, 0, 125]}}\n'
+        "frames:\n  Base: {of: base, translation: [1, 2, 3]}\n  2: {of: base}\n",
+    )
+    assert (list(cell.tools), list(cell.frames)) == (["", "3", "tprobe"], ["", "2"])
     assert cell.tools[""].identified == Transform()
     assert cell.frames[""].identified == Transform((0.001, 0.002, 0.003))
+    assert cell.tools["tprobe"].identified == Transform((0.01, 0.02, 0.125))
+    assert cell.tools["tprobe"].controller == Transform((0.0, 0.0, 0.125))
 
 
 #: What each language calls the flange and the base, besides `flange` and `base`; from its maker's manuals.
@@ -101,40 +110,24 @@ def test_a_target_that_is_a_point_may_be_given_an_orientation(tmp_path: Path) ->
     assert (known.place, known.turned) == (placed, True)
 
 
-def test_a_number_is_a_name(tmp_path: Path) -> None:
-    cell = read(tmp_path, "tools:\n  3: {of: flange}\nframes:\n  2: {of: base}\n")
-    assert list(cell.tools) == ["3"]
-    assert list(cell.frames) == ["2"]
-
-
-def test_a_tool_may_be_a_target_of_the_calibration(tmp_path: Path) -> None:
-    cell = read(tmp_path, 'tools:\n  tProbe: {of: flange, target: "1", controller: {translation: [0, 0, 125]}}\n')
-    assert cell.tools["tprobe"].identified == Transform((0.01, 0.02, 0.125))
-    assert cell.tools["tprobe"].controller == Transform((0.0, 0.0, 0.125))
-
-
-@pytest.mark.parametrize(
-    ("entry", "column"),
-    [
+def test_orientations_as_each_maker_writes_them(tmp_path: Path) -> None:
+    for entry, column in (
         ("quaternion: [0, 1, 0, 0]", [0, 0, -1]),
         ("wpr: [180, 0, 0]", [0, 0, -1]),
         ("abc: [0, 90, 0]", [1, 0, 0]),
         ("rxryrz: [90, 0, 90]", [0, -1, 0]),
         ("rotation_vector: [0, 180, 0]", [0, 0, -1]),
-    ],
-)
-def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, column: list[int]) -> None:
-    cell = read(tmp_path, f"tools:\n  t: {{of: controller, translation: [0, 0, 100], {entry}}}\n")
-    placed = cell.tools["t"]
-    assert placed.identified is None
-    assert placed.controller is not None
-    np.testing.assert_allclose(placed.controller.matrix[:3, 2], column, atol=1e-12)
-    np.testing.assert_allclose(placed.controller.matrix[:3, 3], [0, 0, 0.1])
+    ):
+        cell = read(tmp_path, f"tools:\n  t: {{of: controller, translation: [0, 0, 100], {entry}}}\n")
+        placed = cell.tools["t"]
+        assert placed.identified is None, entry
+        assert placed.controller is not None, entry
+        np.testing.assert_allclose(placed.controller.matrix[:3, 2], column, atol=1e-12)
+        np.testing.assert_allclose(placed.controller.matrix[:3, 3], [0, 0, 0.1])
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+def test_what_is_wrong_is_said(tmp_path: Path) -> None:
+    for text, said in (
         ("frames: {}\n", "has no frames"),
         ("tools:\n  t: {of: world}\n", "got 'world'; allowed: flange, controller"),
         ("frames:\n  f: {of: flange}\n", "got 'flange'; allowed: world, base, controller"),
@@ -150,8 +143,6 @@ def test_orientations_as_each_maker_writes_them(tmp_path: Path, entry: str, colu
         ("frames:\n  base: {of: controller, translation: [0, 0, 1]}\n", "its own base at zero"),
         ("tools:\n  flange: {of: flange, controller: {translation: [0, 0, 1]}}\n", "its own flange at zero"),
         ("tools:\n  t: {of: controller, controller: {translation: [0, 0, 1]}}\n", "says what the controller has"),
-    ],
-)
-def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read(tmp_path, text)
+    ):
+        with pytest.raises(InputError, match=said):
+            read(tmp_path, text)

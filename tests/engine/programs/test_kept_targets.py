@@ -16,8 +16,8 @@ POSE = "[[{},0,400],[0.7071068,0,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9
 
 
 def rapid(*moves: str) -> Program:
-    """Return moves; what follows L or J is x of a pose."""
-    lines = [f"Move{move[0]} {POSE.format(move[1:])},v100,fine,tool0;" for move in moves]
+    """Return moves; what follows J, L or C is x of its poses."""
+    lines = [f"Move{m[0]} {','.join(POSE.format(x) for x in m[1:].split())},v100,fine,tool0;" for m in moves]
     return RAPID.read(
         [Source(Path("m.mod"), "\n".join(["MODULE m", "PROC main()", *lines, "ENDPROC", "ENDMODULE", ""]))]
     )
@@ -34,19 +34,9 @@ def kept(program: Program, worse: list[float], moved: list[float], path: float =
     return found
 
 
-def test_straight_moves_join_their_targets() -> None:
+def test_straight_moves_and_circles_join_their_targets() -> None:
     assert paths_of(rapid("J1", "L2", "L3", "J4", "J5", "L6")).tolist() == [0, 0, 0, 1, 2, 2]
-
-
-def test_a_circle_joins_the_point_that_it_passes() -> None:
-    pose = POSE.format
-    moves = [
-        f"MoveJ {pose(1)},v9,fine,tool0;",
-        f"MoveC {pose(2)},{pose(3)},v9,fine,tool0;",
-        f"MoveJ {pose(4)},v9,fine,tool0;",
-    ]
-    text = "\n".join(["MODULE m", "PROC main()", *moves, "ENDPROC", "ENDMODULE", ""])
-    assert paths_of(RAPID.read([Source(Path("m.mod"), text)])).tolist() == [0, 0, 0, 1]
+    assert paths_of(rapid("J1", "C2 3", "J4")).tolist() == [0, 0, 0, 1]
 
 
 def test_offsets_belong_together() -> None:
@@ -59,23 +49,14 @@ def test_offsets_belong_together() -> None:
 
 def test_targets_that_joint_moves_go_to_are_kept_one_by_one() -> None:
     assert kept(rapid("J1", "J2", "J3"), [0.2, 0.05, 0.11], [1.0, 2.0, 0.5]) == [True, False, True]
+    assert kept(rapid(), [], []) == []
 
 
-def test_a_step_as_small_as_a_tenth_of_a_millimetre_is_left_in_a_path() -> None:
-    assert kept(rapid("L1", "L2", "L3"), [0.0, 0.2, 0.0], [0.3, 0.09, 0.2]) == [False, True, False]
-
-
-def test_a_larger_step_is_not() -> None:
+def test_a_step_as_small_as_a_tenth_of_a_millimetre_is_left_in_a_path_and_a_larger_one_is_not() -> None:
     path = rapid("L1", "L2", "L3")
+    assert kept(path, [0.0, 0.2, 0.0], [0.3, 0.09, 0.2]) == [False, True, False]
     assert kept(path, [0.0, 0.2, 0.0], [0.3, 0.11, 0.2], path=0.05) == [False] * 3
     assert kept(path, [0.0, 0.2, 0.0], [0.3, 0.11, 0.2], path=0.15) == [True] * 3
     assert kept(path, [0.2, 0.2, 0.2], [0.3, 0.11, 0.2], path=0.05) == [True] * 3
-
-
-def test_what_is_not_known_is_left_alone() -> None:
-    path = rapid("L1", "L2", "L3")
+    # What is not known is left alone.
     assert kept(path, [np.nan, 0.2, 0.0], [0.0, 0.3, 0.2], path=0.15) == [False, True, True]
-
-
-def test_a_program_without_targets() -> None:
-    assert kept(rapid(), [], []) == []

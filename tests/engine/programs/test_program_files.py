@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -58,28 +57,29 @@ def test_a_record_holds_the_original_byte_for_byte(tmp_path: Path) -> None:
     assert again.original == MODULE
 
 
-def test_a_corrected_program_is_refused(tmp_path: Path) -> None:
+def test_a_corrected_program_is_refused_and_an_original_has_no_record(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"corrected already.*`again`.*`revert`"):
         program_files([corrected(tmp_path)])
+    path = write(tmp_path, "m.mod")
+    assert program_files([path]) == (ProgramFile(path, "m.mod", MODULE),)
+    with pytest.raises(InputError, match="no record beside this program"):
+        restored([path])
 
 
-@pytest.mark.parametrize(
-    ("comment", "says"),
-    [
+def test_a_comment_that_says_so_is_believed(tmp_path: Path) -> None:
+    for comment, says in (
         (b"! corrected by truearm 0.1.0\r\n", "corrected by truearm 0.1.0"),
         (b"!** corrected by truearm\r\n", "corrected by truearm"),
         (b"! to be corrected by truearm\r\n", None),
         (b"! corrected by truearm on Monday, perhaps\r\n", None),
         (b'TPWrite "corrected by truearm";\r\n', None),
-    ],
-)
-def test_a_comment_that_says_so_is_believed(tmp_path: Path, comment: bytes, says: str | None) -> None:
-    path = write(tmp_path, "m.mod", MODULE.replace(b"ENDMODULE", comment + b"ENDMODULE"))
-    if says is None:
-        assert program_files([path])[0].path == path
-        return
-    with pytest.raises(InputError, match=f"this program was corrected already; got \"the comment '{says}'\""):
-        program_files([path])
+    ):
+        path = write(tmp_path, "m.mod", MODULE.replace(b"ENDMODULE", comment + b"ENDMODULE"))
+        if says is None:
+            assert program_files([path])[0].path == path, comment
+            continue
+        with pytest.raises(InputError, match=f"this program was corrected already; got \"the comment '{says}'\""):
+            program_files([path])
 
 
 def test_a_program_changed_since_is_no_longer_what_its_record_says(tmp_path: Path) -> None:
@@ -92,38 +92,24 @@ def test_a_program_changed_since_is_no_longer_what_its_record_says(tmp_path: Pat
             ask()
 
 
-def damaged() -> Iterator[tuple[str, str]]:
-    yield '{"truearm": "truearm-corrected/1"}', "is missing"
-    yield "{", "this record cannot be read"
-    yield "[" * 100_000, "this record cannot be read"
-    yield "[]", "must hold named entries"
-
-
-@pytest.mark.parametrize(("text", "said"), list(damaged()), ids=["partial", "cut", "deep", "list"])
-def test_a_damaged_record_is_refused(tmp_path: Path, text: str, said: str) -> None:
-    path = corrected(tmp_path)
-    record_path(path).write_text(text)
-    with pytest.raises(InputError, match=said):
-        restored([path])
-
-
-def test_a_damaged_original_is_refused(tmp_path: Path) -> None:
+def test_a_damaged_record_is_refused(tmp_path: Path) -> None:
     path = corrected(tmp_path)
     record = json.loads(record_path(path).read_text())
-    for original in ("AAAA", "not base64!", record["original"][:-8]):
-        record_path(path).write_text(json.dumps({**record, "original": original}))
-        with pytest.raises(InputError, match="the original in this record is damaged"):
+    damaged = "the original in this record is damaged"
+    for text, said in (
+        ('{"truearm": "truearm-corrected/1"}', "is missing"),
+        ("{", "this record cannot be read"),
+        ("[" * 100_000, "this record cannot be read"),
+        ("[]", "must hold named entries"),
+        *((json.dumps({**record, "original": o}), damaged) for o in ("AAAA", "not base64!", record["original"][:-8])),
+    ):
+        record_path(path).write_text(text)
+        with pytest.raises(InputError, match=said):
             restored([path])
 
 
-def test_without_a_record_nothing_can_be_restored(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no record beside this program"):
-        restored([write(tmp_path, "m.mod")])
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "said"),
-    [
+def test_what_is_no_program_is_refused(tmp_path: Path) -> None:
+    for name, content, said in (
         ("m.mod", b"", "the file is empty"),
         ("m.mod", b"MODULE m\0\nENDMODULE", "zero bytes.*Export the program as text"),
         ("m.mod", "MODULE m\nENDMODULE".encode("utf-16"), "UTF-16.*Save it as UTF-8"),
@@ -131,11 +117,9 @@ def test_without_a_record_nothing_can_be_restored(tmp_path: Path) -> None:
         ("m", MODULE, "no suffix"),
         ("m.ls", MODULE, "called as a program in FANUC LS and is none; got 'what looks like RAPID'"),
         ("m.mod", b"hello world", "called as a program in RAPID and is none"),
-    ],
-)
-def test_what_is_no_program_is_refused(tmp_path: Path, name: str, content: bytes, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read_programs(program_files([write(tmp_path, name, content)]))
+    ):
+        with pytest.raises(InputError, match=said):
+            read_programs(program_files([write(tmp_path, name, content)]))
 
 
 def test_a_program_that_is_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,58 +144,33 @@ def test_programs_in_two_languages_are_refused(tmp_path: Path) -> None:
 
 
 def test_programs_of_the_same_name_keep_their_folders(tmp_path: Path) -> None:
-    paths = [
-        write(tmp_path / folder, name)
-        for folder, name in (
-            ("cell1", "m.mod"),
-            ("cell2", "m.mod"),
-            ("cell2", "n.mod"),
-            ("a/x", "k.mod"),
-            ("b/x", "k.mod"),
-        )
-    ]
-    assert [file.name for file in program_files(paths)] == [
-        "cell1/m.mod",
-        "cell2/m.mod",
-        "n.mod",
-        "a/x/k.mod",
-        "b/x/k.mod",
-    ]
-    write_programs(tmp_path / "out", paths, {file.name: file.original for file in program_files(paths)})
+    names = ["cell1/m.mod", "cell2/m.mod", "cell2/n.mod", "a/x/k.mod", "b/x/k.mod"]
+    paths = [write(tmp_path, name) for name in names]
+    files = program_files(paths)
+    assert [file.name for file in files] == ["cell1/m.mod", "cell2/m.mod", "n.mod", "a/x/k.mod", "b/x/k.mod"]
+    write_programs(tmp_path / "out", paths, {file.name: file.original for file in files})
     assert (tmp_path / "out" / "a" / "x" / "k.mod").read_bytes() == MODULE
-
-
-def test_results_stay_in_their_folder(tmp_path: Path) -> None:
-    write(tmp_path / "cell1", "m.mod")
-    paths = [tmp_path / "cell2" / ".." / "m.mod", tmp_path / "cell1" / "m.mod"]
-    (tmp_path / "cell2").mkdir()
+    # A way around through another folder is none that results would take.
     write(tmp_path, "m.mod")
-    assert [file.name for file in program_files(paths)] == [f"{tmp_path.name}/m.mod", "cell1/m.mod"]
+    around = program_files([tmp_path / "cell2" / ".." / "m.mod", paths[0]])
+    assert [file.name for file in around] == [f"{tmp_path.name}/m.mod", "cell1/m.mod"]
 
 
-def test_a_source_is_never_overwritten(tmp_path: Path) -> None:
-    path = write(tmp_path, "m.mod")
+def test_what_truearm_did_not_write_is_not_overwritten(tmp_path: Path) -> None:
+    source = write(tmp_path, "m.mod")
     with pytest.raises(InputError, match="would be overwritten"):
-        write_programs(tmp_path, [path], {"m.mod": b"new"})
-    assert path.read_bytes() == MODULE
-
-
-def test_a_file_that_somebody_else_wrote_is_not_overwritten(tmp_path: Path) -> None:
-    theirs = write(tmp_path / "out", "m.mod", b"theirs")
-    with pytest.raises(InputError, match="not written by truearm or was changed since"):
-        write_programs(tmp_path / "out", [], {"m.mod": b"new", "n.mod": b"other"})
-    assert theirs.read_bytes() == b"theirs"
-    assert not (tmp_path / "out" / "n.mod").exists()
-
-
-def test_a_report_that_somebody_else_wrote_is_not_overwritten(tmp_path: Path) -> None:
-    theirs = write(tmp_path, "compensation.html", b"theirs")
-    with pytest.raises(InputError, match="not written by truearm or was changed since"):
-        write_programs(tmp_path, [], {"m.mod": b"new", "compensation.html": b"page"})
-    theirs.unlink()
+        write_programs(tmp_path, [source], {"m.mod": b"new"})
+    assert source.read_bytes() == MODULE
+    for name in ("m.mod", "compensation.html"):
+        theirs = write(tmp_path / "out", name, b"theirs")
+        with pytest.raises(InputError, match="not written by truearm or was changed since"):
+            write_programs(tmp_path / "out", [], {name: b"new", "n.mod": b"other"})
+        assert theirs.read_bytes() == b"theirs"
+        assert not (tmp_path / "out" / "n.mod").exists()
+        theirs.unlink()
     for page in (b"page", b"other page"):
-        write_programs(tmp_path, [], {"n.txt": b"text", "compensation.html": page})
-    assert theirs.read_bytes() == b"other page"
+        write_programs(tmp_path / "out", [], {"n.txt": b"text", "compensation.html": page})
+    assert (tmp_path / "out" / "compensation.html").read_bytes() == b"other page"
 
 
 def test_an_original_is_not_written_beside_the_record_of_a_correction(tmp_path: Path) -> None:
@@ -248,13 +207,5 @@ def test_edits_change_what_they_name_and_nothing_else(text: str, wanted: list[tu
     for edit in reversed(edits):
         done[edit.start : edit.stop] = [edit.text]
     assert edited(text, edits[::-1] if all(e.start < e.stop for e in edits) else edits) == "".join(done)
-
-
-def test_edits_that_overlap_are_a_fault_of_ours() -> None:
-    with pytest.raises(ValueError, match="overlap"):
+    with pytest.raises(ValueError, match="overlap"):  # a fault of ours
         edited("abcdef", [Edit(0, 0, 3, "x"), Edit(0, 2, 4, "y")])
-
-
-def test_files_keep_what_they_are(tmp_path: Path) -> None:
-    path = write(tmp_path, "m.mod")
-    assert program_files([path]) == (ProgramFile(path, "m.mod", MODULE),)

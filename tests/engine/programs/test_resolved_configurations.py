@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.engine.programs.reading import branches
 
 from truearm.engine.programs.fake_targets import matrices
 from truearm.engine.programs.program import ANY_POSTURE, Configuration
 from truearm.engine.programs.resolved_configurations import ON_EDGE, agrees, resolved_configurations
-from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 
@@ -21,9 +21,7 @@ UNKNOWN = np.full(6, np.nan)
 
 def quadrants(robot: Robot, joints: np.ndarray) -> Configuration:
     """Return the quadrants of axes 1, 4 and 6, as ABB counts them, and the elbow."""
-    rule = branch_rule(robot)
-    assert rule is not None
-    elbow = BRANCHES[int(rule.numbers(robot.forward_kinematics(joints[None]))[0])].split("-")[1]
+    elbow = branches(robot, joints[None])[0].split("-")[1]
     bounds = tuple(
         (axis, math.pi / 2 * q, math.pi / 2 * (q + 1))
         for axis, q in ((axis, math.floor(joints[axis - 1] / (math.pi / 2))) for axis in (1, 4, 6))
@@ -31,24 +29,24 @@ def quadrants(robot: Robot, joints: np.ndarray) -> Configuration:
     return Configuration(elbow=elbow, ranges=bounds)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", ["irb120", "irb1600", "kr5", "lrmate200ic"])
-def test_a_configuration_tells_the_posture_and_the_turn(name: str) -> None:
-    robot = load_robot(name)
-    plain = replace(robot, controller=load_robot("irb120").controller)
-    joints = plain.random_configurations(400, np.random.default_rng(1))
-    meant = resolved_configurations(
-        plain, matrices(plain, joints), [quadrants(plain, q) for q in joints], np.full(joints.shape, np.nan), []
-    )
-    away = meant.joints - joints
-    away[:, 2] -= 2 * math.pi * np.round(away[:, 2] / (2 * math.pi))  # the LR Mate's axis 3 has room for two turns
-    same = np.abs(away).max(axis=1) < 1e-6
-    # Next to an edge of a quadrant another posture may be as good.
-    near_edge = (np.abs((joints[:, [0, 3, 5]] + math.pi / 4) % (math.pi / 2) - math.pi / 4) < 1.01 * ON_EDGE).any(
-        axis=1
-    )
-    assert (same | near_edge).all()
-    assert meant.reachable.all()
-    assert meant.guessed is None
+def test_a_configuration_tells_the_posture_and_the_turn() -> None:
+    for name in ("irb120", "irb1600", "kr5", "lrmate200ic"):
+        robot = load_robot(name)
+        plain = replace(robot, controller=load_robot("irb120").controller)
+        joints = plain.random_configurations(400, np.random.default_rng(1))
+        meant = resolved_configurations(
+            plain, matrices(plain, joints), [quadrants(plain, q) for q in joints], np.full(joints.shape, np.nan), []
+        )
+        away = meant.joints - joints
+        away[:, 2] -= 2 * math.pi * np.round(away[:, 2] / (2 * math.pi))  # the LR Mate's axis 3 has room for two turns
+        same = np.abs(away).max(axis=1) < 1e-6
+        # Next to an edge of a quadrant another posture may be as good.
+        near_edge = (np.abs((joints[:, [0, 3, 5]] + math.pi / 4) % (math.pi / 2) - math.pi / 4) < 1.01 * ON_EDGE).any(
+            axis=1
+        )
+        assert (same | near_edge).all(), name
+        assert meant.reachable.all(), name
+        assert meant.guessed is None, name
 
 
 def test_joints_are_those_that_the_controller_shows() -> None:
@@ -88,26 +86,22 @@ def test_on_a_straight_way_the_branch_stays_however_far_the_wrist_turns() -> Non
     known = np.stack([ends[0], UNKNOWN])
     by_joints = resolved_configurations(robot, poses, configurations, known, [0, 1])
     straight = resolved_configurations(robot, poses, configurations, known, [0, 1], straight=[1])
-    rule = branch_rule(robot)
-    assert rule is not None
-    numbers = [int(rule.numbers(robot.forward_kinematics(found.joints))[1]) for found in (by_joints, straight)]
-    assert numbers[0] != numbers[1] == int(rule.numbers(robot.forward_kinematics(ends[:1]))[0])
+    names = [branches(robot, found.joints)[1] for found in (by_joints, straight)]
+    assert names[0] != names[1] == branches(robot, ends[:1])[0]
     np.testing.assert_allclose(straight.joints[1], ends[1], atol=1e-8)
     # From a stretched wrist both ways of bending are open.
     known[0, 4] = 0.001
     poses[0] = matrices(robot, known[:1])[0]
     stretched = resolved_configurations(robot, poses, configurations, known, [0, 1], straight=[1])
-    assert int(rule.numbers(robot.forward_kinematics(stretched.joints))[1]) == numbers[0]
+    assert branches(robot, stretched.joints)[1] == names[0]
 
 
 def test_with_nothing_to_go_by_the_first_branch_is_taken_and_said() -> None:
     robot = load_robot("ur5")
     joints = np.radians([[10.0, -80, 70, -90, -80, 30]])
     meant = resolved_configurations(robot, matrices(robot, joints), [ANY_POSTURE], UNKNOWN[None], [0])
-    rule = branch_rule(robot)
-    assert rule is not None
     assert meant.guessed == 0
-    assert BRANCHES[int(rule.numbers(robot.forward_kinematics(meant.joints))[0])].startswith("front-up")
+    assert branches(robot, meant.joints)[0].startswith("front-up")
 
 
 def test_out_of_reach_and_out_of_configuration_are_told_apart() -> None:

@@ -1,13 +1,8 @@
-"""truearm: programs of 100 000 targets, read and compared with a correction of nothing, beside one pass of a regex.
-
-The programs are those that the tests make.
-"""
+"""truearm: programs of 100 000 targets, read and compared with a correction of nothing, beside one pass of a regex."""
 
 from __future__ import annotations
 
-import importlib
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,20 +10,37 @@ from stopwatch import median_seconds, report
 
 import truearm
 from truearm.engine.programs import LANGUAGES
+from truearm.engine.programs.new_program import NewProgram
 from truearm.engine.programs.program import NUMBER, Language, Program, Source
 from truearm.engine.programs.program_files import ProgramFile, edited, read_programs
 from truearm.engine.programs.program_poses import edits_of, pose_numbers, poses_of
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 COUNT = 100_000
 NUMBERS = re.compile(NUMBER)
 
 
 def sources(language: Language) -> list[Source]:
-    """Return a program of that many targets."""
-    folder = language.read.__module__.split("programs.")[1].split(".")[0]
-    made: list[Source] = importlib.import_module(f"tests.engine.programs.test_{folder}").program_of(COUNT)
-    return made
+    """Return a program of that many targets, as truearm writes paths."""
+    robot, rng = truearm.load_robot("irb120"), np.random.default_rng(0)
+    joints = robot.random_configurations(COUNT, rng)
+    position, rotation = robot.forward(joints)
+    poses = np.tile(np.eye(4), (COUNT, 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = rotation, position
+    path = NewProgram(
+        name="path",
+        robot=robot.name,
+        joints=joints,
+        sliding=(False,) * 6,
+        poses=poses,
+        branches=(0,) * COUNT,
+        durations=np.full(COUNT, 0.1),
+        speeds=np.full(COUNT, 0.1),
+        spacing=np.full(COUNT, 0.01),
+        corrected=False,
+        beside=0.0,
+    )
+    assert language.new is not None
+    return [Source(Path(name), text) for name, text in language.new(path).items()]
 
 
 def round_trip(program: Program) -> None:

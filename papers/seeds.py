@@ -16,7 +16,9 @@ from truearm.engine.base.parts import done_parts
 from truearm.engine.base.workers import Workers
 
 Outcome = TypeVar("Outcome")
-
+Drawn = TypeVar("Drawn")
+#: What one seed finds: a figure for each row, by table and row (as :data:`papers.texts.Rows` has it).
+Figures = dict[str, dict[str, float]]
 
 #: Who does the seeds of the study that runs; None where they are done here.
 _WORKERS: Final[ContextVar[Workers | None]] = ContextVar("_WORKERS", default=None)
@@ -101,6 +103,18 @@ def _outcome(part: tuple[Callable[[Seed], Any], Seed]) -> tuple[Any]:
 
 def _silent(_: str) -> None:
     """Say nothing: nobody looks at what a worker says."""
+
+
+def gathered(outcomes: Iterable[tuple[Figures, Drawn]]) -> tuple[dict[str, dict[str, list[float]]], tuple[Drawn, ...]]:
+    """Return the figures of all seeds by table and row, one value a seed that has it, and what else seeds found."""
+    tables: dict[str, dict[str, list[float]]] = {}
+    rest = []
+    for figures, more in outcomes:
+        rest.append(more)
+        for table, rows in figures.items():
+            for row, value in rows.items():
+                tables.setdefault(table, {}).setdefault(row, []).append(float(value))
+    return tables, tuple(rest)
 
 
 def median_of(outcomes: Iterable[Outcome], figure: Callable[[Outcome], float]) -> float:

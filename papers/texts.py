@@ -1,0 +1,103 @@
+"""A study's words and the numbers that its document prints, read from its ``study.yaml``, beside our figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from papers.study import Picture, Row, Study, Table
+from papers.verdicts import Claim
+from truearm.engine.document.drawing import Figure
+
+#: Ours by row: what it is of, with its unit in brackets if it is not that of its table. One value a seed, or a number
+#: that no chance enters; a row without any value is left out.
+Rows = Mapping[str, Sequence[float] | float]
+#: What is said of rows beyond the file, by table and row.
+Said = Mapping[str, Mapping[str, str]]
+
+
+def told(
+    folder: str | Path,
+    seeds: int,
+    tables: Mapping[str, Rows],
+    figures: Mapping[str, Figure],
+    *,
+    printed: Said | None = None,
+    why: Said | None = None,
+    files: Mapping[str, str] | None = None,
+    **values: object,
+) -> Study:
+    """Return a study: the words of ``study.yaml``, and our figures beside those printed there.
+
+    A text of the file may name a value in braces, with its format: one of `values`, or ``table[row]``, the median.
+
+    Args:
+        folder: Of the study, or a module in it.
+        seeds: How many.
+        tables: Our figures by table and row, in the order of the rows.
+        figures: What is drawn, by the name of the picture.
+        printed: Printed numbers that follow from others of the document.
+        why: Explanations that follow from what was found.
+        files: What else the study writes.
+        values: What texts name.
+
+    Raises:
+        KeyError: If the file speaks of a row, a table or a value that there is not.
+    """
+    name = Path(folder).parent.name
+    written = _written(Path(folder).with_name("study.yaml"))
+    medians = {key: {row.what: row.median for row in _rows({}, ours, {}, {}, str)} for key, ours in tables.items()}
+
+    def filled(text: str) -> str:
+        return text.format_map({**medians, **values})
+
+    def table(key: str, of: Mapping[str, Any]) -> Table:
+        rows = _rows(of, tables[key], (printed or {}).get(key, {}), (why or {}).get(key, {}), filled)
+        return Table(filled(of["title"]), filled(of["words"]), tuple(rows))
+
+    return Study(
+        name=name.replace("_", "-"),
+        title=written["title"],
+        source=written["source"],
+        answer=filled(written["answer"]),
+        seeds=seeds,
+        tables=tuple(table(key, of) for key, of in written["tables"].items() if tables[key]),
+        pictures=tuple(
+            Picture(key, filled(of["title"]), filled(of["words"]), figures[key])
+            for key, of in written["pictures"].items()
+        ),
+        notes=tuple(map(filled, written["notes"])),
+        files=files or {},
+    )
+
+
+def _written(file: Path) -> dict[str, Any]:
+    """Read a file, all scalars as text: a printed 0.50 keeps its digits."""
+    from ruamel.yaml import YAML
+
+    return cast("dict[str, Any]", YAML(typ="base").load(file))
+
+
+def _rows(
+    of: Mapping[str, Any], ours: Rows, printed: Mapping[str, str], why: Mapping[str, str], filled: Any
+) -> Iterator[Row]:
+    """Give the rows of a table, as the file and what was found tell of them."""
+    printed, why = {**of.get("printed", {}), **printed}, {**of.get("why", {}), **why}
+    sources, claims = of.get("sources", {}), of.get("claims", {})
+    left = {*printed, *why, *sources, *claims}
+    for key, values in ours.items():
+        what, bracket, unit = key.partition(" [")
+        left.discard(what)
+        if isinstance(values, float | int) or len(values):
+            yield Row(
+                what,
+                unit.removesuffix("]") if bracket else of.get("unit", ""),
+                values,
+                printed.get(what),
+                sources.get(what, of.get("source", "")) if what in printed else "",
+                cast("Claim", claims.get(what, of.get("claim", "equal"))),
+                filled(why.get(what, "")),
+            )
+    if left:
+        raise KeyError(f"{of['title']}: there is no row {', '.join(sorted(left))}")

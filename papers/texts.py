@@ -79,11 +79,19 @@ def _written(file: Path) -> dict[str, Any]:
     return cast("dict[str, Any]", YAML(typ="base").load(file))
 
 
+def _flat(entries: Mapping[str, Any], name: str = "") -> dict[str, str]:
+    """Return entries by their whole names: a mapping among them goes on where its own name ends."""
+    found: dict[str, str] = {}
+    for key, entry in entries.items():
+        found |= {name + key: entry} if isinstance(entry, str) else _flat(entry, name + key)
+    return found
+
+
 def _rows(
     of: Mapping[str, Any], ours: Rows, printed: Mapping[str, str], why: Mapping[str, str], filled: Any
 ) -> Iterator[Row]:
     """Give the rows of a table, as the file and what was found tell of them."""
-    printed, why = {**of.get("printed", {}), **printed}, {**of.get("why", {}), **why}
+    printed, why = {**_flat(of.get("printed", {})), **printed}, {**_flat(of.get("why", {})), **why}
     sources, claims = of.get("sources", {}), of.get("claims", {})
     left = {*printed, *why, *sources, *claims}
     for key, values in ours.items():

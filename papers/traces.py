@@ -16,15 +16,9 @@ def scatter(name: str, mode: str, x: Sequence[Any], y: Sequence[Any], **more: ob
     return {"type": "scatter", "mode": mode, "name": name, "x": x, "y": y, **more}
 
 
-def in_space(name: str, mode: str, points: Array, **more: object) -> Figure:
-    """Return lines, markers or both through points ``(n, 3)`` that have been rounded."""
-    return {
-        "type": "scatter3d",
-        "mode": mode,
-        "name": name,
-        **dict(zip("xyz", np.transpose(points).tolist(), strict=True)),
-        **more,
-    }
+def in_space(name: str, mode: str, xyz: Iterable[Sequence[Any]], **more: object) -> Figure:
+    """Return the same in space, through points of which `xyz` has the coordinates."""
+    return {"type": "scatter3d", "mode": mode, "name": name, **dict(zip("xyz", xyz, strict=True)), **more}
 
 
 def histogram(

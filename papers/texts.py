@@ -62,7 +62,7 @@ def told(
         source=written["source"],
         answer=filled(written["answer"]),
         seeds=seeds,
-        tables=tuple(table(key, of) for key, of in written["tables"].items() if tables[key]),
+        tables=tuple(table(key, of) for key, of in written["tables"].items() if tables.get(key)),
         pictures=tuple(
             Picture(key, filled(of["title"]), filled(of["words"]), figures[key])
             for key, of in written["pictures"].items()
@@ -70,6 +70,11 @@ def told(
         notes=tuple(map(filled, written["notes"])),
         files=files or {},
     )
+
+
+def printed_in(module: str | Path, table: str) -> dict[str, str]:
+    """Return the printed numbers of a table by row, from the ``study.yaml`` beside a module."""
+    return _flat(_written(Path(module).with_name("study.yaml"))["tables"][table]["printed"])
 
 
 def _written(file: Path) -> dict[str, Any]:
@@ -92,7 +97,7 @@ def _rows(
 ) -> Iterator[Row]:
     """Give the rows of a table, as the file and what was found tell of them."""
     printed, why = {**_flat(of.get("printed", {})), **printed}, {**_flat(of.get("why", {})), **why}
-    sources, claims = of.get("sources", {}), of.get("claims", {})
+    sources, claims = _flat(of.get("sources", {})), _flat(of.get("claims", {}))
     left = {*printed, *why, *sources, *claims}
     for key, values in ours.items():
         what, bracket, unit = key.partition(" [")

@@ -98,6 +98,9 @@ def _rows(
     """Give the rows of a table, as the file and what was found tell of them."""
     printed, why = {**_flat(of.get("printed", {})), **printed}, {**_flat(of.get("why", {})), **why}
     sources, claims = _flat(of.get("sources", {})), _flat(of.get("claims", {}))
+    printed, why, sources, claims = (
+        {filled(row): said[row] for row in said} for said in (printed, why, sources, claims)
+    )
     left = {*printed, *why, *sources, *claims}
     for key, values in ours.items():
         what, bracket, unit = key.partition(" [")

@@ -17,6 +17,7 @@ from papers.study import Study
 from papers.texts import Rows, told
 from papers.traces import scatter
 from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import IntArray
 from truearm.engine.data.hexapod import (
     CUPS,
     DEVICE,
@@ -105,7 +106,7 @@ def _gain_of(name: str) -> str:
     return f"times as many configurations of the {_ROBOTS[name][0]}"
 
 
-def _counts(designed: Sequence[HexapodPose], apart: Array, alike: Array) -> dict[str, float]:
+def _counts(designed: Sequence[HexapodPose], apart: Array, alike: IntArray) -> dict[str, float]:
     """Count designs, assemblies and poses, and see how far apart poses are."""
     pairs = set(near_equal(designed))
     by_number = {pose.number: pose for pose in designed}
@@ -140,8 +141,8 @@ def _uncertainty(drawn: Rows) -> Rows:
         per_axis = np.sqrt(np.diag(u.covariance)).reshape(3, 3)
         per_axis[2] = u.third_as_printed
         alone = f"{name}3 as if nothing were correlated"
-        for cup, along in zip((f"{name}1", f"{name}2", alone), per_axis.tolist(), strict=True):
-            rows |= {f"{cup}, along {letter}": value for letter, value in zip("xyz", along, strict=True)}
+        for at, along in zip((f"{name}1", f"{name}2", alone), per_axis.tolist(), strict=True):
+            rows |= {f"{at}, along {letter}": value for letter, value in zip("xyz", along, strict=True)}
         rows[alone] = float(np.linalg.norm(u.third_as_printed))
     return rows
 

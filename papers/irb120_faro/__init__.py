@@ -218,7 +218,7 @@ def _split(
 
     def fitted(count: int, wanted: Sequence[_Case]) -> dict[str, float]:
         seed.step(f"{count} training configurations")
-        rows = {}
+        rows: dict[str, float] = {}
         for case in wanted:
             rows |= _mean_and_maximum(case.name, _held_out(case.of(robot), data, order, count, case.model))
         return rows

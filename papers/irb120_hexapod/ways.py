@@ -13,6 +13,7 @@ from papers.hexapod_place import PLACE, fixture_at, placed, touched
 from papers.irb120 import ELASTIC
 from papers.irb120_hexapod.worn import calibrated
 from papers.placements import identify_placements
+from papers.seeds import Figures
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.hexapod import DEVICE, HexapodPose
 from truearm.engine.data.statistics import errors_of
@@ -45,32 +46,6 @@ _DRIFT: Final = 3e-6 / (6 * 39)
 TURNS: Final = 6
 #: Nearer to the middle of the poses than this is near [m] (Nubiola, 4.4).
 _NEAR: Final = 0.200
-
-
-@dataclass(frozen=True, eq=False)
-class Way:
-    """A calibration of one seed."""
-
-    configurations: int  #: How many it was made from.
-    #: everywhere, near: error of each cup over unseen configurations, and of those near the fixture [m].
-    everywhere: Array
-    near: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Ways:
-    """All calibrations of one seed."""
-
-    tracker: Way  #: By the readings of a tracker.
-    few: Way  #: With the device at the place of section 3.5.
-    one_place: Way  #: At a flat fixture before the robot.
-    three_places: Way  #: At three, frames of the places and model found in turn.
-    by_touches: Way  #: The same, each place by the joint positions at its cups and the model from the first place.
-    by_touches_in_turn: Way  #: The same again and again, each time with the model found before.
-    four_cups: Way  #: At all sides of a fixture with a fourth cup.
-    drifting: Way  #: At one place, with a bar that is never put on its calibrator.
-    attached_anew: Way  #: At one place, the tool attached anew for every pose.
-    either_side: Way  #: At one place, joints come from either side.
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +98,7 @@ def ways(
     unseen: Dataset,
     rng: np.random.Generator,
     coarser: int = 1,
-) -> Ways:
+) -> Figures:
     """Calibrate in all ways.
 
     Args:
@@ -136,6 +111,10 @@ def ways(
         unseen: True positions to judge by, in the twin's world.
         rng: For noise, lag and the tool changer.
         coarser: Only every so many-th configuration that the robot reaches.
+
+    Returns:
+        Error of each cup over unseen configurations and over those near the fixture [mm], and from how many
+        configurations, by way.
     """
     bench = _Bench(twin, nominal, drive, wanted, rng, coarser)
     sessions = [(*bench.at(place), bench.plan(place)) for place in _PLACES]
@@ -146,12 +125,16 @@ def ways(
     middle = first.base_cups.mean(axis=0) + 0.245 * plain_frame(first.base_cups).rotation[:, 2]
     near = np.linalg.norm(unseen.position - middle, axis=1) < _NEAR
 
-    def judged(robot: Robot, configurations: int, fixtures: SetUp | None = first) -> Way:
-        errors = _errors(robot, unseen, fixtures)
-        return Way(configurations, errors, errors[near])
+    figures: Figures = {"everywhere": {}, "near": {}, "configurations": {}}
 
-    def from_session(part: Dataset, fixtures: SetUp | None = first) -> Way:
-        return judged(calibrated(nominal, part), part.configurations, fixtures)
+    def judge(way: str, robot: Robot, configurations: int, fixtures: SetUp | None = first) -> None:
+        errors = _errors(robot, unseen, fixtures)
+        figures["configurations"][way] = configurations
+        for table, of in (("everywhere", errors), ("near", errors[near])):
+            figures[table] |= {f"{way}: mean": 1e3 * float(of.mean()), f"{way}: maximum": 1e3 * float(of.max())}
+
+    def judge_session(way: str, part: Dataset, fixtures: SetUp | None = first) -> None:
+        judge(way, calibrated(nominal, part), part.configurations, fixtures)
 
     one = calibrated(nominal, data[0])
     total = sum(part.configurations for part in data)
@@ -163,18 +146,17 @@ def ways(
     turns = [one]
     for _ in range(TURNS):
         turns.append(calibrated(nominal, _by_touches(turns[-1], data, by_touch)))
-    return Ways(
-        tracker=from_session(tracker, None),
-        few=from_session(few, tilted),
-        one_place=judged(one, data[0].configurations),
-        three_places=judged(identify_placements(nominal, data, ELASTIC).robot, total),
-        by_touches=judged(turns[1], total),
-        by_touches_in_turn=judged(turns[-1], total),
-        four_cups=from_session(all_sides),
-        drifting=from_session(drifting),
-        attached_anew=from_session(attached_anew),
-        either_side=from_session(either_side),
-    )
+    judge_session("tracker", tracker, None)
+    judge_session("one place, 22 poses", few, tilted)
+    judge("one place", one, data[0].configurations)
+    judge("three places", identify_placements(nominal, data, ELASTIC).robot, total)
+    judge("three places, frames by touches", turns[1], total)
+    judge("three places, frames by touches, in turn", turns[-1], total)
+    judge_session("four cups", all_sides)
+    judge_session("one place, bar never put on its calibrator", drifting)
+    judge_session("one place, tool attached anew for every pose", attached_anew)
+    judge_session("one place, joints come from either side", either_side)
+    return figures
 
 
 def _four_sides(bench: _Bench, first: SetUp, flat: Sequence[PlannedRow]) -> Dataset:

@@ -194,7 +194,7 @@ def _at_poses(found: Mapping[tuple[str, str], Mapping[str, float]]) -> Figures:
 
 
 def _side_by_side(left: Mapping[tuple[str, str], float]) -> dict[str, float]:
-    rows = {}
+    rows: dict[str, float] = {}
     for truth in _TRUTHS:
         rows |= {f"{truth}: {words}": left[truth, method] for method, words in _METHODS.items()}
         over = left[truth, "influence"] / left[truth, "least squares"]

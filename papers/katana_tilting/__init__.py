@@ -57,7 +57,7 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = 200)
     found, drawn = gathered(over_seeds(seeds, progress, partial(_one, cube=cube, count=count, unseen=unseen)))
     within = found["constants"].pop("within")
     stated = {"values within two of their own stated deviations of the truth [%]": 100 * float(np.mean(within))}
-    ten = {}
+    ten: dict[str, list[float]] = {}
     for method in _COLUMNS.values():
         ranks = np.sort([errors[method][:10] for _, errors in drawn], axis=1).T.tolist()
         ten |= {f"{method}, {rank} of 10": values for rank, values in enumerate(ranks, 1)}

@@ -30,7 +30,8 @@ def told(
 ) -> Study:
     """Return a study: the words of ``study.yaml``, and our figures beside those printed there.
 
-    A text of the file may name a value in braces, with its format: one of `values`, or ``table[row]``, the median.
+    A text of the file may name a value in braces, with its format: one of `values`, ``seeds``, or ``table[row]``, the
+    median of that row.
 
     Args:
         folder: Of the study, or a module in it.
@@ -50,7 +51,7 @@ def told(
     medians = {key: {row.what: row.median for row in _rows({}, ours, {}, {}, str)} for key, ours in tables.items()}
 
     def filled(text: str) -> str:
-        return text.format_map({**medians, **values})
+        return text.format_map({"seeds": seeds, **medians, **values})
 
     def table(key: str, of: Mapping[str, Any]) -> Table:
         rows = _rows(of, tables[key], (printed or {}).get(key, {}), (why or {}).get(key, {}), filled)

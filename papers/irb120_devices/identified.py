@@ -26,19 +26,20 @@ _LINKS: Final = tuple(f"{kind}_{i}" for i in range(2, 7) for kind in _KINDS if (
 #: The base, Rot(x, alpha) Rot(y, beta) Rot(z, gamma) behind Trans(x, y, z).
 _BASE: Final = {"x": "mm", "y": "mm", "z": "mm", "alpha": "deg", "beta": "deg", "gamma": "deg"}
 #: Units by name.
-UNITS: Final[Mapping[str, str]] = {
+_UNITS: Final[Mapping[str, str]] = {
     **{f"base {name}": unit for name, unit in _BASE.items()},
     **{name: _KINDS[name.rpartition("_")[0]][0] for name in _LINKS},
 }
 
 
 def deviations(robot: Robot) -> dict[str, float]:
-    """Return how far an identified robot is from the nominal one, in the document's units.
+    """Return how far an identified robot is from the nominal one, by name and unit of the document.
 
     Args:
         robot: As identified, in the frame of an instrument that sees the robot at :data:`STATION`.
     """
-    return _deviations(robot.values, robot.base, STATION)
+    found = _deviations(robot.values, robot.base, STATION)
+    return {f"{name} [{_UNITS[name]}]": off for name, off in found.items()}
 
 
 def printed(truth: str) -> dict[str, str]:
@@ -57,7 +58,7 @@ def _deviations(values: Mapping[str, float], base: Transform, place: Transform) 
     x, y, z = place.rotation.T @ (np.array(base.translation) - np.array(place.translation)) + R[:, 2] * values["d_1"]
     turns = (math.atan2(-R[1, 2], R[2, 2]), math.asin(R[0, 2]), math.atan2(-R[0, 1], R[0, 0]))
     places = (x, y, z - nominal["d_1"])
-    found = dict(zip(UNITS, (*(1e3 * p for p in places), *map(math.degrees, turns)), strict=False))
+    found = dict(zip(_UNITS, (*(1e3 * p for p in places), *map(math.degrees, turns)), strict=False))
     for name in _LINKS:
         off = values.get(name, 0.0) - nominal.get(name, 0.0)
         if name == "d_2":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,15 +32,10 @@ _ON_AXIS_6 = frozenset({"alpha_6", "a_6", "compliance_6"})
 class Accuracy:
     """What an instrument makes of the robot."""
 
-    device: Device  #: The instrument.
-    configurations: int  #: How many it measured.
     #: Whether it says where the robot stands. Where it does not, errors are those left by the best rigid motion.
     anchored: bool
-    #: before, after: position errors of its own targets at unseen configurations [m], of the nominal robot in the
-    #: frames that the same readings give it, and of the identified one.
-    before: Array
-    after: Array
-    sized: Array  #: Of the identified robot, a change of size taken out as well.
+    after: Array  #: Position errors of its own targets at unseen configurations [m], of the identified robot.
+    sized: Array  #: The same, a change of size taken out as well.
     gauges: tuple[str, ...]  #: What nobody measured: ``base``, ``size``.
     #: What its readings leave open of the arm itself, beside what no instrument sees, as combinations.
     unobservable: tuple[str, ...]
@@ -61,38 +55,26 @@ def accuracy(
     fit = identify(nominal, data, ELASTIC)
     points = _targets(device, twin)
     truly = np.concatenate([truth.places(points[name]) for name in data.targets])
-    before = _predicted(place(nominal, data), data, truth)
     after = _predicted(fit.robot, data, truth)
     if not data.anchored:
-        before, after = _moved(before, truly), _moved(after, truly)
+        after = _moved(after, truly)
+    read = [v for v in (data.position, data.distance, data.height) if v is not None]
     return Accuracy(
-        device,
-        count,
-        data.anchored,
-        _lengths(before - truly),
-        _lengths(after - truly),
-        _lengths(_resized(after, truly) - truly),
-        gauge_freedoms(data),
-        _unobservable(fit, data),
-        sum(int(np.isfinite(v).sum()) for v in (data.position, data.distance, data.height) if v is not None)
-        + 3 * int(data.has_orientation.sum()),
+        anchored=data.anchored,
+        after=_lengths(after - truly),
+        sized=_lengths(_resized(after, truly) - truly),
+        gauges=gauge_freedoms(data),
+        unobservable=_unobservable(fit, data),
+        numbers=sum(int(np.isfinite(v).sum()) for v in read) + 3 * int(data.has_orientation.sum()),
     )
-
-
-@dataclass(frozen=True)
-class ToolErrors:
-    """How far off a tool centre point is that was found by touching one point, by the number of touches [m]."""
-
-    #: nominal, calibrated, true: found on the nominal robot, on one that a tracker calibrated, and on the true one.
-    nominal: Mapping[int, float]
-    calibrated: Mapping[int, float]
-    true: Mapping[int, float]
 
 
 def tool_alone(
     nominal: Robot, twin: Twin, truth: Truth, touches: tuple[int, ...], rng: np.random.Generator
-) -> ToolErrors:
-    """Return how far off a tool centre point is that was found by touching one point.
+) -> dict[str, float]:
+    """Return how far off a tool centre point is that was found by touching one point [mm], by robot and touches.
+
+    On the nominal robot, on one that a tracker calibrated, and on the true one.
 
     The right answer for a robot that errs is the tool centre point with which it errs least: the mean of where the true
     tip is, seen from the flange that the robot believes in.
@@ -112,11 +94,17 @@ def tool_alone(
         }
         return {count: float(np.linalg.norm(place - right)) for count, place in found.items()}
 
-    return ToolErrors(
-        nominal=errors(place(nominal, with_tracker)),
-        calibrated=errors(identify(nominal, with_tracker, ELASTIC).robot),
-        true=errors(twin.robot.with_effects(("compliance",)).with_values(compliance)),
-    )
+    true = twin.robot.with_effects(("compliance",)).with_values(compliance)
+    robots = {
+        "nominal": place(nominal, with_tracker),
+        "calibrated": identify(nominal, with_tracker, ELASTIC).robot,
+        "true": true,
+    }
+    return {
+        f"{name} robot, {count} touches": 1e3 * error
+        for name, robot in robots.items()
+        for count, error in errors(robot).items()
+    }
 
 
 def _targets(device: Device, twin: Twin) -> dict[str, tuple[float, ...]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -15,13 +14,6 @@ from truearm.engine.robot.transform import rigid_motion, rotation_from_vector
 #: [m]: invented, no distance is printed.
 _GRANITE: Final = np.array([[-0.2, -0.2, 0.0], [0.2, -0.2, 0.0], [0.2, 0.2, 0.0], [-0.2, 0.2, 0.0]])
 _ARTEFACT: Final = np.array([0.0, 0.0, 0.1])
-#: Table 2.5, by set-up of ours: nests 1 to 3 on the artefact, nest 4 on the granite [mm].
-TABLE_2_5: Final[Mapping[tuple[str, str], tuple[str, str, str, str]]] = {
-    ("triangular", "laser tracker"): ("0.034", "0.029", "0.035", "0.034"),
-    ("triangular", "C-Track"): ("0.124", "0.061", "0.082", "0.124"),
-    ("spatial", "laser tracker"): ("0.015", "0.015", "0.010", "0.038"),
-    ("spatial", "C-Track"): ("0.129", "0.118", "0.138", "0.177"),
-}
 
 
 def nest_errors(setup: Setup, sigma: float, size: float | None, rng: np.random.Generator) -> Array:

@@ -48,41 +48,14 @@ class Setup:
     payload: Payload
     nests: dict[str, Point]
     configurations: int  #: How many it calibrated with (sections 2.5.3 to 2.5.5).
-    before: str  #: before, after: mean position error that it prints [mm], section 2.6.2.
-    after: str
 
 
+_TRIANGULAR_SETUP: Final = (Payload(_TRIANGULAR.mass, _TRIANGULAR.cog), dict(_TRIANGULAR.targets))
+_SPATIAL_SETUP: Final = (Payload(2.6, (-0.023, 0.0, 0.1)), _SPATIAL)
 SETUPS: Final = (
-    Setup(
-        "tracker",
-        TRACKER,
-        "tracker-triangular",
-        Payload(_TRIANGULAR.mass, _TRIANGULAR.cog),
-        dict(_TRIANGULAR.targets),
-        38,
-        "3.168",
-        "0.146",
-    ),
-    Setup(
-        "planar artefact",
-        PLANAR_ARTEFACT,
-        "ctrack-triangular",
-        Payload(_TRIANGULAR.mass, _TRIANGULAR.cog),
-        dict(_TRIANGULAR.targets),
-        36,
-        "4.639",
-        "0.176",
-    ),
-    Setup(
-        "spatial artefact",
-        SPATIAL_ARTEFACT,
-        "ctrack-spatial",
-        Payload(2.6, (-0.023, 0.0, 0.1)),
-        _SPATIAL,
-        35,
-        "2.913",
-        "0.149",
-    ),
+    Setup("tracker", TRACKER, "tracker-triangular", *_TRIANGULAR_SETUP, 38),
+    Setup("planar artefact", PLANAR_ARTEFACT, "ctrack-triangular", *_TRIANGULAR_SETUP, 36),
+    Setup("spatial artefact", SPATIAL_ARTEFACT, "ctrack-spatial", *_SPATIAL_SETUP, 35),
 )
 
 
@@ -103,15 +76,6 @@ class Calibrated:
         return _errors(self.robot, self.setup, truth)
 
 
-@dataclass(frozen=True)
-class Shares:
-    """What an instrument sees [percent]."""
-
-    seen: float  #: Of all configurations.
-    several: float | None  #: Two reflectors or more, of those that are seen; None for an instrument without reflectors.
-    back: float | None  #: The side of a plate that is seen less often, of those that are seen; None without a plate.
-
-
 def twin_of(setup: Setup, truth: str, *, least: bool = False) -> Twin:
     """Return the twin with one of the robot file's truths and gears that run out, carrying what the set-up does."""
     twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)), least=least)
@@ -129,20 +93,21 @@ def visible_configurations(setup: Setup, count: int, rng: np.random.Generator) -
     return shown(_seen_by(setup), count, rng, setup.device.visible, setup.device.name)
 
 
-def shares(setup: Setup, count: int, rng: np.random.Generator) -> Shares:
-    """Return of how many of random configurations something is seen, and what."""
+def shares(setup: Setup, count: int, rng: np.random.Generator) -> dict[str, float]:
+    """Return of how many of random configurations something is seen, and of these what [%], in words."""
     robot = _seen_by(setup)
     joints = robot.random_configurations(count, rng)
     seen = setup.device.visible(robot, joints)
-    several, back = None, None
+    found = {"of all configurations": 100.0 * float(seen.any(axis=1).mean())}
     if isinstance(setup.device, Tracker):
         several = 100.0 * float((seen.sum(axis=1) > 1).sum() / seen.any(axis=1).sum())
+        found["of these, with two reflectors or more"] = several
     elif setup.device is PLANAR_ARTEFACT:
         joints = joints[seen[:, 0]]
         place, rotation = robot.world_poses(joints, robot.targets[0].name)
         share = float((np.einsum("ni,ni->n", rotation[:, :, 1], place) < 0.0).mean())
-        back = 100.0 * min(share, 1.0 - share)
-    return Shares(100.0 * float(seen.any(axis=1).mean()), several, back)
+        found["of these, the side seen less often"] = 100.0 * min(share, 1.0 - share)
+    return found
 
 
 def calibrate(
@@ -150,12 +115,9 @@ def calibrate(
 ) -> Calibrated:
     """Measure a twin at configurations that O1 chooses and identify the document's model.
 
-    Parameters
-    ----------
-    candidates
-        How many visible configurations there are to choose from.
-    chosen
-        Whether they are chosen by O1; by chance if not.
+    Args:
+        candidates: How many visible configurations there are to choose from.
+        chosen: Whether they are chosen by O1; by chance if not.
     """
     joints, seen = visible_configurations(setup, candidates, rng)
     rows, known = _rows(setup, joints, seen)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from papers.katana.robot import katana
-from papers.katana_devices import study
+from papers.katana_devices import study, together
 from papers.katana_devices.page import OnPage
-from papers.katana_devices.run import together
 from papers.katana_devices.setup import USED, Counts
 from papers.study import Study
 from truearm.engine.data.observations import compared

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from papers.study import Picture, Row, Study, Table
 from papers.verdicts import Claim
 from truearm.engine.document.drawing import Figure
@@ -22,15 +24,15 @@ def told(
     seeds: int,
     tables: Mapping[str, Rows],
     figures: Mapping[str, Figure],
+    texts: Mapping[str, object] | None = None,
     *,
     printed: Said | None = None,
     why: Said | None = None,
     files: Mapping[str, str] | None = None,
-    **values: object,
 ) -> Study:
     """Return a study: the words of ``study.yaml``, and our figures beside those printed there.
 
-    A text of the file may name a value in braces, with its format: one of `values`, ``seeds``, or ``table[row]``, the
+    A text of the file may name a value in braces, with its format: one of `texts`, ``seeds``, or ``table[row]``, the
     median of that row.
 
     Args:
@@ -38,22 +40,26 @@ def told(
         seeds: How many.
         tables: Our figures by table and row, in the order of the rows.
         figures: What is drawn, by the name of the picture.
+        texts: What texts name.
         printed: Printed numbers that follow from others of the document.
         why: Explanations that follow from what was found.
         files: What else the study writes.
-        values: What texts name.
 
     Raises:
         KeyError: If the file speaks of a row, a table or a value that there is not.
     """
     name = Path(folder).parent.name
     written = _written(Path(folder).with_name("study.yaml"))
-    medians = {key: {row.what: row.median for row in _rows({}, ours, {}, {}, str)} for key, ours in tables.items()}
+    medians = {
+        key: {row.partition(" [")[0]: np.median(of) for row, of in rows.items() if np.size(of)}
+        for key, rows in tables.items()
+    }
 
     def filled(text: str) -> str:
-        return text.format_map({"seeds": seeds, **medians, **values})
+        return text.format_map({"seeds": seeds, **medians, **(texts or {})})
 
     def table(key: str, of: Mapping[str, Any]) -> Table:
+        of = {"unit": written.get("unit", ""), **of}
         rows = _rows(of, tables[key], (printed or {}).get(key, {}), (why or {}).get(key, {}), filled)
         return Table(filled(of["title"]), filled(of["words"]), tuple(rows))
 
@@ -109,7 +115,7 @@ def _rows(
         if isinstance(values, float | int) or len(values):
             yield Row(
                 what,
-                unit.removesuffix("]") if bracket else of.get("unit", ""),
+                unit.removesuffix("]") if bracket else of["unit"],
                 values,
                 printed.get(what),
                 sources.get(what, of.get("source", "")) if what in printed else "",

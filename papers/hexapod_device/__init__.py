@@ -86,20 +86,13 @@ def study(seeds: int, progress: Progress, trials: int = 20_000, places: bool = T
     }
     del tables["monte carlo"]
     largest = {row: float(np.median(values)) for row, values in {**found["drift"], **found["changer"]}.items()}
-    return told(
-        __file__,
-        seeds,
-        tables,
-        {"poses": _poses_figure(designed), "distances": _distances_figure(designed)},
-        never=largest["never put on its calibrator: largest"],
-        fresh=largest["a bar that does not drift: largest"],
-        changed=largest["attached anew before every pose: largest"],
-        alike=alike[-1],
-        readings=6 * len(plan.rows),
-        times=_REPEATED,
-        configurations=len(plan.rows),
-        poses=plan.poses_reached,
-    )
+    figures = {"poses": _poses_figure(designed), "distances": _distances_figure(designed)}
+    texts: dict[str, object] = {"never": largest["never put on its calibrator: largest"]}
+    texts |= {"fresh": largest["a bar that does not drift: largest"]}
+    texts |= {"changed": largest["attached anew before every pose: largest"], "alike": alike[-1]}
+    texts |= {"readings": 6 * len(plan.rows), "times": _REPEATED, "configurations": len(plan.rows)}
+    texts |= {"poses": plan.poses_reached}
+    return told(__file__, seeds, tables, figures, texts)
 
 
 def _gain_of(name: str) -> str:

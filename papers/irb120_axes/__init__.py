@@ -93,16 +93,10 @@ def study(seeds: int, progress: Progress, coarser: int = 1) -> Study:
         "matched": matched,
     }
     sines, least = ([of.amplitude for of in group.values()] for group in (chosen, smallest[_BETWEEN]))
-    return told(
-        __file__,
-        seeds,
-        tables,
-        {"angular-errors": _errors_figure(*drawn[0])},
-        sines=(min(sines), max(sines)),
-        least=(min(least), max(least)),
-        own=", ".join(f"{n}: {1e6 * c:.0f}" for n, c in nearest.items()),
-        noise=_NOISE * 1e3,
-    )
+    figures = {"angular-errors": _errors_figure(*drawn[0])}
+    texts: dict[str, object] = {"sines": (min(sines), max(sines)), "least": (min(least), max(least))}
+    texts |= {"own": ", ".join(f"{n}: {1e6 * c:.0f}" for n, c in nearest.items()), "noise": _NOISE * 1e3}
+    return told(__file__, seeds, tables, figures, texts)
 
 
 def _twin(truth: str) -> Twin:

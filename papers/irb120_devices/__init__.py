@@ -134,28 +134,23 @@ def study(
 
     least = [left("after", f"{setup.name}, the least run-out that Table 2.3 allows: mean") for setup in SETUPS]
     alike = [left("instruments", row) for row in found["instruments"] if row.endswith(": mean")]
+    figures = {
+        "places": _places_figure(drawn[0].places),
+        "errors": _errors_figure([one.errors for one in drawn]),
+        "instruments": _instruments_figure(left, found),
+    }
+    texts: dict[str, object] = {"least": least, "best": min(alike), "worst": max(alike), "count": _COUNT}
+    texts |= {"more_count": 3 * _COUNT, "whole": in_zones("geometric", None)}
+    texts |= {"cut": in_zones("geometric", divisions[-1]), "elastic": in_zones("elastic", None)}
+    texts |= {"candidates": candidates, "unseen": unseen, "few": min(seeds, few)}
     return told(
         __file__,
         seeds,
         tables,
-        {
-            "places": _places_figure(drawn[0].places),
-            "errors": _errors_figure([one.errors for one in drawn]),
-            "instruments": _instruments_figure(left, found),
-        },
+        figures,
+        texts,
         printed={_PARAMETERS[setup.name]: printed(setup.truth) for setup in SETUPS},
         why=drawn[0].why,
-        least=least,
-        best=min(alike),
-        worst=max(alike),
-        count=_COUNT,
-        more_count=3 * _COUNT,
-        whole=in_zones("geometric", None),
-        cut=in_zones("geometric", divisions[-1]),
-        elastic=in_zones("elastic", None),
-        candidates=candidates,
-        unseen=unseen,
-        few=min(seeds, few),
     )
 
 

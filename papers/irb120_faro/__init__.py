@@ -152,23 +152,12 @@ def study(
     }
     chose = "; ".join(words for one in chosen for words in one)
     cold, warm = (float(np.median(tables["remainder"][f"{name}: mean length"])) for name in (_COLD, _WARM))
-    return told(
-        __file__,
-        seeds,
-        every,
-        {"models": _models_figure(tables, together, many)},
-        why={"gains": gains},
-        document_count=_DOCUMENT,
-        many_count=many,
-        few_count=_FEW,
-        auto_few=_AUTO_FEW,
-        best=np.median(means[several[-1]]),
-        warmth=cold - warm,
-        left_in=np.median(left_in),
-        folds=FOLDS,
-        searches=searches,
-        chosen=f" It chose {chose}." if chose else "",
-    )
+    figures = {"models": _models_figure(tables, together, many)}
+    texts: dict[str, object] = {"document_count": _DOCUMENT, "many_count": many, "few_count": _FEW}
+    texts |= {"auto_few": _AUTO_FEW, "best": np.median(means[several[-1]]), "warmth": cold - warm}
+    texts |= {"left_in": np.median(left_in), "folds": FOLDS, "searches": searches}
+    texts |= {"chosen": f" It chose {chose}." if chose else ""}
+    return told(__file__, seeds, every, figures, texts, why={"gains": gains})
 
 
 _COLD: Final = "elastic and five more, no warm-up"

@@ -79,24 +79,14 @@ def study(seeds: int, progress: Progress, unseen: int = 300, coarser: int = 1) -
         tables[table] = rows
     taken = {row.pose for row in plan.rows}
     reached = poses_figure([("reached", AFTER, [pose for pose in designed if pose.number in taken])])
-    return told(
-        __file__,
-        seeds,
-        tables,
-        {
-            "reached": reached,
-            "sphere": _sphere_figure(missed[0], "12", {"laser tracker": AFTER, "C-Track": BEFORE}),
-            "spatial": _sphere_figure(missed[0], "13", {"C-Track, spatial": BEFORE}),
-        },
-        slipped=math.degrees(_SLIPPED),
-        all=means["everywhere"],
-        close=means["near"],
-        n=counts,
-        turns=TURNS,
-        training=_TRAINING,
-        poses=_POSES,
-        repeated=_REPEATED,
-    )
+    figures = {
+        "reached": reached,
+        "sphere": _sphere_figure(missed[0], "12", {"laser tracker": AFTER, "C-Track": BEFORE}),
+        "spatial": _sphere_figure(missed[0], "13", {"C-Track, spatial": BEFORE}),
+    }
+    texts: dict[str, object] = {"slipped": math.degrees(_SLIPPED), "all": means["everywhere"], "close": means["near"]}
+    texts |= {"n": counts, "turns": TURNS, "training": _TRAINING, "poses": _POSES, "repeated": _REPEATED}
+    return told(__file__, seeds, tables, figures, texts)
 
 
 def _reach(plan: Reachable) -> dict[str, float]:

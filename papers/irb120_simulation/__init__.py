@@ -52,7 +52,9 @@ def study(seeds: int, progress: Progress, unseen: int = 1000) -> Study:
     before, noisy = map(np.concatenate, zip(*errors, strict=True))
     shown = (("nominal, before", BEFORE, before), ("0.070 mm noise, masses 10 % off, after", AFTER, noisy))
     drawn = histogram(shown, (1e-3, 10.0), "position error [mm]", "readings", 340)
-    return told(__file__, seeds, tables, {"errors": drawn}, unseen=unseen)
+    figures = {"errors": drawn}
+    texts: dict[str, object] = {"unseen": unseen}
+    return told(__file__, seeds, tables, figures, texts)
 
 
 def _one(seed: Seed, unseen: int) -> tuple[Figures, tuple[Array, Array]]:

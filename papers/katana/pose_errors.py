@@ -86,12 +86,4 @@ def pose_errors(predicted: tuple[Array, Array], true: tuple[Array, Array]) -> Ma
     turned = np.abs(np.degrees((turned + np.pi) % (2 * np.pi) - np.pi))
     x, y, z = np.abs(apart).T
     phi, theta, psi = turned.T
-    return {
-        "dX": x,
-        "dY": y,
-        "dZ": z,
-        "dP": np.linalg.norm(apart, axis=1),
-        "dPhi": phi,
-        "dTheta": theta,
-        "dPsi": psi,
-    }
+    return {"dX": x, "dY": y, "dZ": z, "dP": np.linalg.norm(apart, axis=1), "dPhi": phi, "dTheta": theta, "dPsi": psi}

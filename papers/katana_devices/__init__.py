@@ -94,27 +94,13 @@ def study(seeds: int, progress: Progress, counts: Counts | None = None) -> Study
     }
     alone, first = STARTS
     circle = {what: float(np.median(found["page"][f"{LOW_COST}, {first}: {what}"])) for what in (_TRUE, _SHOWN)}
-    return told(
-        __file__,
-        seeds,
-        tables,
-        {"devices": _devices_figure(left), "page": _page_figure(pages)},
-        why={"unobservable": unseen},
-        alone_markers=left[MARKERS.name, alone],
-        alone_spheres=left["two-spheres", alone],
-        markers=left[MARKERS.name, first],
-        spheres=left["two-spheres", first],
-        low_cost=left[LOW_COST, first],
-        point=left["point", first],
-        plane=left["plane", first],
-        shown=circle[_SHOWN],
-        true=circle[_TRUE],
-        registry=counts.registry,
-        touched=counts.touched,
-        drawn=counts.drawn,
-        both=counts.of(LOW_COST),
-        largest_of=counts.unseen,
-    )
+    figures = {"devices": _devices_figure(left), "page": _page_figure(pages)}
+    texts: dict[str, object] = {"alone_markers": left[MARKERS.name, alone], "alone_spheres": left["two-spheres", alone]}
+    texts |= {"markers": left[MARKERS.name, first], "spheres": left["two-spheres", first]}
+    texts |= {"low_cost": left[LOW_COST, first], "point": left["point", first], "plane": left["plane", first]}
+    texts |= {"shown": circle[_SHOWN], "true": circle[_TRUE], "registry": counts.registry, "touched": counts.touched}
+    texts |= {"drawn": counts.drawn, "both": counts.of(LOW_COST), "largest_of": counts.unseen}
+    return told(__file__, seeds, tables, figures, texts, why={"unobservable": unseen})
 
 
 _TABLES: Final[Mapping[Start, str]] = {"geometry alone": "alone", "tilting first": "first"}

@@ -102,16 +102,12 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = 200)
         "contradictions": {**floors, **found["contradictions"], **same},
     }
     shown = replace(influences[0], names=DOCUMENT_NAMES)
-    return told(
-        __file__,
-        seeds,
-        tables,
-        {"influence": influence_figure(shown), "methods": _methods_figure(left)},
-        beats="does not beat joint least squares on any" if beaten else "beats joint least squares on one",
-        count=count,
-        side=cube.side * 1e3,
-        noise=arm.NOISE * 1e3,
-    )
+    figures = {"influence": influence_figure(shown), "methods": _methods_figure(left)}
+    texts: dict[str, object] = {
+        "beats": "does not beat joint least squares on any" if beaten else "beats joint least squares on one"
+    }
+    texts |= {"count": count, "side": cube.side * 1e3, "noise": arm.NOISE * 1e3}
+    return told(__file__, seeds, tables, figures, texts)
 
 
 def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> tuple[Figures, Influence]:

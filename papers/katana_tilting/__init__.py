@@ -72,16 +72,9 @@ def study(seeds: int, progress: Progress, count: int = POSES, unseen: int = 200)
         for method, colour in zip(_COLUMNS.values(), (BEFORE, "#b3261e", AFTER), strict=True)
     ]
     errors_figure = histogram(shown, (1e-3, 3.0), "|dP| [mm]", "configurations", 360, opacity=0.75)
-    return told(
-        __file__,
-        seeds,
-        tables,
-        {"poses": pose_cube(drawn[0][0]), "errors": errors_figure},
-        asked=_ASKED,
-        unseen_count=unseen,
-        side=cube.side * 1e3,
-        noise=NOISE * 1e3,
-    )
+    figures = {"poses": pose_cube(drawn[0][0]), "errors": errors_figure}
+    texts: dict[str, object] = {"asked": _ASKED, "unseen_count": unseen, "side": cube.side * 1e3, "noise": NOISE * 1e3}
+    return told(__file__, seeds, tables, figures, texts)
 
 
 def _one(seed: Seed, cube: Cube, count: int, unseen: int) -> tuple[Figures, _Drawn]:

@@ -71,17 +71,9 @@ def study(seeds: int, progress: Progress, step: float = 0.05, poses: int = POSES
     """
     tables, drawn = gathered(over_seeds(seeds, progress, partial(_one, step=step, poses=poses)))
     alone = tables["causes"]["tilting, mean"]
-    return told(
-        __file__,
-        seeds,
-        tables,
-        _figures(drawn[0]),
-        least=min(alone),
-        most=max(alone),
-        count=poses,
-        speed=SPEED,
-        samples=_SAMPLES,
-    )
+    texts: dict[str, object] = {"least": min(alone), "most": max(alone), "count": poses, "speed": SPEED}
+    texts |= {"samples": _SAMPLES}
+    return told(__file__, seeds, tables, _figures(drawn[0]), texts)
 
 
 def _one(seed: Seed, step: float, poses: int) -> tuple[Figures, _Drawn]:

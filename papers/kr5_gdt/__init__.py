@@ -93,22 +93,12 @@ def study(seeds: int, progress: Progress, repetitions: int = 1000) -> Study:
         "determined": {**_determined(nominal), "from circles": len(exact.free.names)},
         "tolerances": _tolerances(),
     }
-    return told(
-        __file__,
-        seeds,
-        {**tables, **counted},
-        {"circles": _circles_figure(nominal), "model": _model_figure(drawn[0]), "lines": _lines_figure(drawn[0])},
-        printed={"errors": sums},
-        repetitions=repetitions,
-        least=inside.min(),
-        most=inside.max(),
-        worst=min(min(tables["reductions"][d]) for d in DIRECTIONS),
-        unseen="; ".join(r.combination for r in exact.redundancies),
-        moving=", ".join(exact.moving_flange),
-        larger=_LARGER,
-        noise=_NOISE * 1e3,
-        repeats=_REPEATS,
-    )
+    figures = {"circles": _circles_figure(nominal), "model": _model_figure(drawn[0]), "lines": _lines_figure(drawn[0])}
+    texts: dict[str, object] = {"repetitions": repetitions, "least": inside.min(), "most": inside.max()}
+    texts |= {"worst": min(min(tables["reductions"][d]) for d in DIRECTIONS)}
+    texts |= {"unseen": "; ".join(r.combination for r in exact.redundancies), "moving": ", ".join(exact.moving_flange)}
+    texts |= {"larger": _LARGER, "noise": _NOISE * 1e3, "repeats": _REPEATS}
+    return told(__file__, seeds, {**tables, **counted}, figures, texts, printed={"errors": sums})
 
 
 def _scale(unit: str) -> float:

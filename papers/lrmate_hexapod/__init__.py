@@ -117,22 +117,18 @@ def study(seeds: int, progress: Progress, configurations: int = 9905, others: in
     tracked, device = (of_others["near"][f"{name}: mean beyond 400 mm"] for name in (_BY_TRACKER, _FOUND[1]))
     first = drawn[0]
     every = _every(first)
-    return told(
-        __file__,
-        seeds,
-        tables,
-        {
-            "arms": _arms_figure(station.robot, first),
-            "away": _bands_figure(first),
-            **_scattered(first),
-            **_signed(first),
-        },
-        held=(min(final), max(final)),
-        following=(min(means[_FOLLOWING[1]]), max(means[_FOLLOWING[1]])),
-        worse=sum(a > b for a, b in zip(final, preliminary, strict=True)),
-        better=sum(a < b for a, b in zip(tracked, device, strict=True)),
-        shown="All configurations" if every == 1 else f"One of {every} configurations",
-    )
+    figures = {
+        "arms": _arms_figure(station.robot, first),
+        "away": _bands_figure(first),
+        **_scattered(first),
+        **_signed(first),
+    }
+    texts: dict[str, object] = {"held": (min(final), max(final))}
+    texts |= {"following": (min(means[_FOLLOWING[1]]), max(means[_FOLLOWING[1]]))}
+    texts |= {"worse": sum(a > b for a, b in zip(final, preliminary, strict=True))}
+    texts |= {"better": sum(a < b for a, b in zip(tracked, device, strict=True))}
+    texts |= {"shown": "All configurations" if every == 1 else f"One of {every} configurations"}
+    return told(__file__, seeds, tables, figures, texts)
 
 
 def _station() -> _Station:
@@ -180,10 +176,7 @@ def _campaign(station: _Station, twin: Twin, truth: HeldOut, seed: Seed) -> tupl
         _BY_TRACKER: _tracked(station, twin, frame, rng),
     }
     judgements = {name: judged(model, truth) for name, model in models.items()}
-    uncorrected = {
-        _HELD[1]: held(plain)[1],
-        _FOLLOWING[1]: identified_following(robot, campaign.data, plain),
-    }
+    uncorrected = {_HELD[1]: held(plain)[1], _FOLLOWING[1]: identified_following(robot, campaign.data, plain)}
     gains = {
         name: 100.0 * (1.0 - judgements[name].mean / mean_position_error(model, truth))
         for name, model in uncorrected.items()

@@ -10,22 +10,25 @@ from typing import Final
 import numpy as np
 
 from papers import Progress
-from papers.irb120_devices.identified import deviations, printed
 from papers.irb120_devices.instruments import accuracy, tool_alone
-from papers.irb120_devices.nests import nest_errors
 from papers.irb120_devices.setups import (
     SETUPS,
     Calibrated,
     Setup,
+    Truth,
     calibrate,
+    deviations,
+    driven,
+    nest_errors,
     number_by_o1,
+    printed,
+    running_out,
     shares,
     sphere_test,
     twin_of,
     uncalibrated,
     visible_configurations,
 )
-from papers.irb120_devices.twin import Truth, driven, running_out
 from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
 from papers.texts import Rows, told

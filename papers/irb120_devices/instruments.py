@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from papers.irb120 import ELASTIC
-from papers.irb120_devices.twin import Truth
+from papers.irb120_devices.setups import Truth
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.fit.fit import Fit, identify, place

@@ -11,9 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from papers import Progress, regions
+from papers import Progress
 from papers.hexapod_place import PLACE, poses_figure, touched
-from papers.irb120 import without_beta
+from papers.irb120 import REGION, without_beta
 from papers.irb120_hexapod.spheres import TRACKER, spheres
 from papers.irb120_hexapod.ways import TURNS, ways
 from papers.irb120_hexapod.worn import calibrated, in_base, tracked, worn_twin
@@ -103,8 +103,8 @@ def _one(seed: Seed, unseen: int, coarser: int) -> tuple[Figures, _Missed]:
     rng = seed.generator()
     twin = worn_twin(rng)
     nominal = load_robot("irb120").with_payload(twin.robot.payload)
-    read = tracked(twin, regions.IRB120.draw(_TRAINING, rng), TRACKER, rng)
-    truth = tracked(twin, regions.IRB120.draw(unseen, rng), 0.0, rng)
+    read = tracked(twin, REGION.draw(_TRAINING, rng), TRACKER, rng)
+    truth = tracked(twin, REGION.draw(unseen, rng), 0.0, rng)
     model = calibrated(without_beta(nominal), read)
     drive, cups = with_cups(in_base(model))
     wanted = poses(cups)
@@ -191,7 +191,7 @@ def _by_arm(
     twin: Twin, drive: Robot, frame: Transform, fixtures: SetUp, cups: Array, rng: np.random.Generator
 ) -> PoseErrors:
     """Return the errors of poses that look up, read by a measurement arm from the base cups."""
-    q = regions.IRB120.draw(4000, rng)
+    q = REGION.draw(4000, rng)
     up = q[drive.world_poses(q)[1][:, 2, 2] > 0.5][:_BY_ARM]
     approach = rng.choice([-1.0, 1.0], up.shape)
     names = [target.name for target in twin.robot.targets]

@@ -8,8 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from papers import regions
-from papers.irb120 import without_beta
+from papers.irb120 import REGION, without_beta
 from papers.irb120_hexapod.worn import calibrated, in_base, tracked, worn_twin
 from papers.seeds import Figures
 from truearm.engine.data.hexapod import DEVICE
@@ -62,8 +61,8 @@ def spheres(
     nominal = without_beta(load_robot("irb120").with_payload(twin.robot.payload))
     spatial = _with_spatial(rng)
     spatial_nominal = without_beta(load_robot("irb120").with_payload(_SPATIAL_LOAD))
-    seen = tracked(twin, regions.IRB120.draw(_TRAINING["C-Track"], rng), C_TRACK, rng)
-    seen_spatial = tracked(spatial, regions.IRB120.draw(_TRAINING["C-Track, spatial"], rng), C_TRACK, rng)
+    seen = tracked(twin, REGION.draw(_TRAINING["C-Track"], rng), C_TRACK, rng)
+    seen_spatial = tracked(spatial, REGION.draw(_TRAINING["C-Track, spatial"], rng), C_TRACK, rng)
     models = {
         "laser tracker": (twin, in_base(tracker)),
         "C-Track": (twin, in_base(calibrated(nominal, seen))),
@@ -126,7 +125,7 @@ def _on_sphere(model: Robot, nest: str, centre: Array, count: int, rng: np.rando
     """Return joint positions that bring a nest to points of the sphere above the ball, ``(count, joints)``."""
     rows: list[Array] = []
     while sum(map(len, rows)) < count:
-        q = regions.IRB120.draw(4000, rng)
+        q = REGION.draw(4000, rng)
         position, rotation = model.world_poses(q, nest)
         away = position - centre
         distance = np.linalg.norm(away, axis=1)

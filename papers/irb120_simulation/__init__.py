@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from papers import Progress, regions
-from papers.irb120 import ELASTIC, without_beta
+from papers import Progress
+from papers.irb120 import ELASTIC, REGION, without_beta
 from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
 from papers.texts import told
@@ -61,8 +61,8 @@ def _one(seed: Seed, unseen: int) -> tuple[Figures, tuple[Array, Array]]:
     """Return figures of one seed, and the errors before and after the calibration with noise [mm]."""
     rng = seed.generator()
     nominal = load_robot("irb120")
-    joints = regions.IRB120.draw(_TRAINING, rng)
-    others = regions.IRB120.draw(unseen, rng)
+    joints = REGION.draw(_TRAINING, rng)
+    others = REGION.draw(unseen, rng)
     published = truth_twin(nominal, "tracker-triangular", rng)
     there = nominal.with_frames(STATION, nominal.tools["triangular"].targets)
 

@@ -16,7 +16,7 @@ import pytest
 import papers
 import truearm
 from papers import STUDIES, Entry, run_study
-from papers.regions import IRB120
+from papers.irb120 import REGION
 from papers.seeds import Seed, median_of, over_seeds, seeds_done_by
 from papers.study import Picture, Row, Study, Table, number
 from papers.verdicts import VERDICTS, Comparison
@@ -191,8 +191,8 @@ def test_the_median_is_over_the_seeds() -> None:
 
 
 def test_a_region_is_drawn_from_evenly() -> None:
-    drawn = IRB120.draw(4000, np.random.default_rng(0))
-    low, high = IRB120.limits
+    drawn = REGION.draw(4000, np.random.default_rng(0))
+    low, high = REGION.limits
     assert drawn.shape == (4000, 6)
     assert drawn.min(axis=0) == pytest.approx(low, abs=0.01)
     assert drawn.max(axis=0) == pytest.approx(high, abs=0.01)

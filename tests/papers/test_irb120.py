@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from papers import irb120_axes, irb120_faro, irb120_simulation
-from papers.irb120_axes.single_joint import AxisTest, run_out, turn_of
+from papers.irb120_axes import AxisTest, run_out, turn_of
 from papers.study import Study
 from truearm.engine.base.errors import InputError
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from papers.irb120_devices import study
-from papers.irb120_devices.setups import SETUPS, shares, twin_of, visible_configurations
-from papers.irb120_devices.twin import Truth, driven, running_out
+from papers.irb120_devices.setups import SETUPS, Truth, driven, running_out, shares, twin_of, visible_configurations
 from papers.study import Row, Study
 from truearm.engine.twin.devices import named_device
 from truearm.engine.twin.truths import truth_twin

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from papers.campaign import touching
-from papers.traces import in_space
+from papers.traces import coordinates, in_space, scene
 from truearm.engine.data.hexapod import DEVICE, HexapodPose, triangle
-from truearm.engine.document.drawing import CAMERA, Figure, figure, rounded_to, scene_axis
+from truearm.engine.document.drawing import CAMERA, Figure, figure, rounded_to
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
@@ -69,11 +69,11 @@ def poses_figure(groups: Sequence[tuple[str, str, Sequence[HexapodPose]]]) -> Fi
     for name, colour, found in groups:
         traces.append(_triangles(f"{name}: tool", colour, [pose.cups for pose in found], 2))
         flanges = 1e3 * np.array([pose.position for pose in found])
-        places = [rounded_to(flanges[:, n], 1) for n in range(3)]
         said = {"text": [f"pose {pose.number}" for pose in found], "hovertemplate": "%{text}<extra></extra>"}
-        traces.append(in_space(f"{name}: flange", "markers", places, **said, marker={"color": colour, "size": 4}))
-    scene = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
-    return figure(traces, 480, scene={**scene, "aspectmode": "data", "camera": CAMERA})
+        traces.append(
+            in_space(f"{name}: flange", "markers", coordinates(flanges, 1), **said, marker={"color": colour, "size": 4})
+        )
+    return figure(traces, 480, scene=scene("mm", camera=CAMERA))
 
 
 def _triangles(name: str, colour: str, triangles: Sequence[Array], width: int) -> Figure:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from truearm.engine.document.drawing import Figure, axis, figure, logarithmic_axis, rounded
+from truearm.engine.document.drawing import Figure, axis, figure, logarithmic_axis, rounded, rounded_to, scene_axis
 from truearm.engine.robot.chain import Array
 
 
@@ -19,6 +19,16 @@ def scatter(name: str, mode: str, x: Sequence[Any], y: Sequence[Any], **more: ob
 def in_space(name: str, mode: str, xyz: Iterable[Sequence[Any]], **more: object) -> Figure:
     """Return the same in space, through points of which `xyz` has the coordinates."""
     return {"type": "scatter3d", "mode": mode, "name": name, **dict(zip("xyz", xyz, strict=True)), **more}
+
+
+def coordinates(points: Array, decimals: int) -> list[list[Any]]:
+    """Return x, y and z of points ``(n, 3)`` with so many decimals."""
+    return [rounded_to(points[:, k], decimals) for k in range(3)]
+
+
+def scene(unit: str, **more: object) -> Figure:
+    """Return the axes of a picture in space, a unit as long on each; `more` follows."""
+    return {f"{letter}axis": scene_axis(f"{letter} [{unit}]") for letter in "xyz"} | {"aspectmode": "data", **more}
 
 
 def histogram(

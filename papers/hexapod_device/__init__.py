@@ -17,22 +17,8 @@ from papers.study import Study
 from papers.texts import Rows, told
 from papers.traces import scatter
 from truearm.engine.base.errors import InputError
+from truearm.engine.data import hexapod
 from truearm.engine.data.dataset import IntArray
-from truearm.engine.data.hexapod import (
-    CUPS,
-    DEVICE,
-    SOLUTIONS,
-    HexapodPose,
-    assemblies,
-    designs,
-    distance,
-    distinct,
-    leg_lengths,
-    near_equal,
-    poses,
-    tool_cups,
-    triangle,
-)
 from truearm.engine.document.drawing import AFTER, BEFORE, Figure, axis, figure, rounded
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
@@ -70,10 +56,10 @@ def study(seeds: int, progress: Progress, trials: int = 20_000, places: bool = T
         places: Whether robots are asked what they reach with a fourth cup.
     """
     robot, cups = with_cups(load_robot("irb120"))
-    plan = reachable(robot, PLACE, poses(cups), branches=("front-up",))
+    plan = reachable(robot, PLACE, hexapod.poses(cups), branches=("front-up",))
     found, _ = gathered(over_seeds(seeds, progress, partial(_one, robot, plan, trials=trials, places=places)))
-    designed = poses()
-    apart = np.array([distance(a, b) for a, b in combinations(designed, 2)])
+    designed = hexapod.poses()
+    apart = np.array([hexapod.distance(a, b) for a, b in combinations(designed, 2)])
     _, alike = np.unique(np.round(apart, 6), axis=0, return_counts=True)
     alike.sort()
     tables: dict[str, Rows] = {
@@ -99,21 +85,21 @@ def _gain_of(name: str) -> str:
     return f"times as many configurations of the {_ROBOTS[name][0]}"
 
 
-def _counts(designed: Sequence[HexapodPose], apart: Array, alike: IntArray) -> dict[str, float]:
+def _counts(designed: Sequence[hexapod.HexapodPose], apart: Array, alike: IntArray) -> dict[str, float]:
     """Count designs, assemblies and poses, and see how far apart poses are."""
-    pairs = set(near_equal(designed))
+    pairs = set(hexapod.near_equal(designed))
     by_number = {pose.number: pose for pose in designed}
     flanges = np.array([pose.position for pose in designed])
-    apex = four_cups(np.full(3, DEVICE.base), np.full(3, DEVICE.base))[3] * [1.0, 1.0, -1.0]
+    apex = four_cups(np.full(3, hexapod.DEVICE.base), np.full(3, hexapod.DEVICE.base))[3] * [1.0, 1.0, -1.0]
     rows: dict[str, float] = {
-        "designs": len(designs()),
-        "assemblies above the base": len(list(assemblies())),
+        "designs": len(hexapod.designs()),
+        "assemblies above the base": len(list(hexapod.assemblies())),
         "poses": len(designed),
         "near-equal pairs (30 deg, 50 mm)": len(pairs),
-        "poses kept": len(distinct(designed)),
+        "poses kept": len(hexapod.distinct(designed)),
     }
     for n, group in enumerate(_GROUPS, 1):
-        turned, way = (np.mean([distance(by_number[a], by_number[b])[k] for a, b in group]) for k in (0, 1))
+        turned, way = (np.mean([hexapod.distance(by_number[a], by_number[b])[k] for a, b in group]) for k in (0, 1))
         rows[f"group {n}: pairs as printed"] = len(pairs & set(group))
         rows |= {f"group {n}: angle [deg]": math.degrees(turned), f"group {n}: distance [mm]": 1e3 * float(way)}
     return rows | {
@@ -143,21 +129,21 @@ def _uncertainty(drawn: Rows) -> Rows:
 def _accuracy() -> dict[str, float]:
     """Return what Table 3.1 means in micrometres."""
     worst = max(norm for u in all_solutions().values() for norm in u.norms)
-    of_designs = [max(cup_uncertainty(solution, design).norms) for design, solution in assemblies()]
+    of_designs = [max(cup_uncertainty(solution, design).norms) for design, solution in hexapod.assemblies()]
     rng = np.random.default_rng(0)
-    d = np.repeat([DEVICE.base, DEVICE.tool, DEVICE.leg], (3, 3, 6))
+    d = np.repeat([hexapod.DEVICE.base, hexapod.DEVICE.tool, hexapod.DEVICE.leg], (3, 3, 6))
     off = [
-        max(cup_uncertainty(solution, lengths=d + rng.uniform(-1.0, 1.0, 12) * DEVICE.reach).norms)
+        max(cup_uncertainty(solution, lengths=d + rng.uniform(-1.0, 1.0, 12) * hexapod.DEVICE.reach).norms)
         / max(cup_uncertainty(solution).norms)
         - 1.0
-        for solution in SOLUTIONS
+        for solution in hexapod.SOLUTIONS
         for _ in range(25)
     ]
     return {
-        "standard deviation": worst * DEVICE.sigma * 1e6,
-        "at 95 %": 1.96 * worst * DEVICE.sigma * 1e6,
-        "standard deviation, best of all designs": min(of_designs) * DEVICE.sigma * 1e6,
-        "standard deviation, worst of all designs": max(of_designs) * DEVICE.sigma * 1e6,
+        "standard deviation": worst * hexapod.DEVICE.sigma * 1e6,
+        "at 95 %": 1.96 * worst * hexapod.DEVICE.sigma * 1e6,
+        "standard deviation, best of all designs": min(of_designs) * hexapod.DEVICE.sigma * 1e6,
+        "standard deviation, worst of all designs": max(of_designs) * hexapod.DEVICE.sigma * 1e6,
         "largest change by lengths 1 mm off [%]": 100.0 * float(np.abs(off).max()),
         "lengths to cups and back, largest difference [mm]": 1e3 * _round_trip(),
     }
@@ -166,13 +152,17 @@ def _accuracy() -> dict[str, float]:
 def _round_trip() -> float:
     rng = np.random.default_rng(0)
     base, tool, legs = (
-        nominal + rng.uniform(-1.0, 1.0, (count, 100)) * DEVICE.reach
-        for nominal, count in ((DEVICE.base, 3), (DEVICE.tool, 3), (DEVICE.leg, 6))
+        nominal + rng.uniform(-1.0, 1.0, (count, 100)) * hexapod.DEVICE.reach
+        for nominal, count in ((hexapod.DEVICE.base, 3), (hexapod.DEVICE.tool, 3), (hexapod.DEVICE.leg, 6))
     )
-    feet = triangle(base, "B")
+    feet = hexapod.triangle(base, "B")
     return max(
-        float(np.abs(leg_lengths(design, feet, tool_cups(design, solution, base, tool, legs)) - legs).max())
-        for design, solution in assemblies()
+        float(
+            np.abs(
+                hexapod.leg_lengths(design, feet, hexapod.tool_cups(design, solution, base, tool, legs)) - legs
+            ).max()
+        )
+        for design, solution in hexapod.assemblies()
     )
 
 
@@ -204,7 +194,7 @@ def _one(robot: Robot, plan: Reachable, seed: Seed, trials: int, places: bool) -
     attaching = ToolChanger(rng)
     attached = [_cups(attaching.attached(twin), joints[:1], IDENTITY)[0] for _ in range(_ATTACHED)]
     figures: Figures = {"monte carlo": {}, "drift": {}, "changer": {}, "repeated": {}}
-    for solution in SOLUTIONS:
+    for solution in hexapod.SOLUTIONS:
         deviations = enumerate(cup_monte_carlo(solution, trials, rng), 1)
         figures["monte carlo"] |= {f"solution {solution}, t{cup}": deviation for cup, deviation in deviations}
     place, turn = _flange(trials, rng)
@@ -222,7 +212,7 @@ def _one(robot: Robot, plan: Reachable, seed: Seed, trials: int, places: bool) -
         "attached anew before every pose: mean error of the cups": float(changed.mean()),
         "attached anew before every pose: largest": float(changed.max()),
     }
-    figures["repeated"]["flange"] = 1e6 * max(repeatability(rigid_motion(CUPS, of)[1]) for of in repeated)
+    figures["repeated"]["flange"] = 1e6 * max(repeatability(rigid_motion(hexapod.CUPS, of)[1]) for of in repeated)
     if places:
         figures["fourth"] = {_gain_of(name): _gain(name, rng) for name in _ROBOTS}
     return figures, None
@@ -242,11 +232,11 @@ def _flange(trials: int, rng: np.random.Generator) -> tuple[float, float]:
     Worst of the document's solutions, for its design and its tool.
     """
     worst = np.zeros(2)
-    for pose in (p for p in poses() if p.design.name == "112212331"):
-        lengths = np.repeat([DEVICE.base, DEVICE.tool, DEVICE.leg], (3, 3, 6))[:, None]
-        d = lengths + DEVICE.sigma * rng.standard_normal((12, trials // 10))
-        cups = tool_cups(pose.design, pose.solution, d[:3], d[3:6], d[6:])
-        R, p = rigid_motion(CUPS, np.moveaxis(cups, -1, 0))
+    for pose in (p for p in hexapod.poses() if p.design.name == "112212331"):
+        lengths = np.repeat([hexapod.DEVICE.base, hexapod.DEVICE.tool, hexapod.DEVICE.leg], (3, 3, 6))[:, None]
+        d = lengths + hexapod.DEVICE.sigma * rng.standard_normal((12, trials // 10))
+        cups = hexapod.tool_cups(pose.design, pose.solution, d[:3], d[3:6], d[6:])
+        R, p = rigid_motion(hexapod.CUPS, np.moveaxis(cups, -1, 0))
         turned = np.swapaxes(R, 1, 2) @ pose.rotation
         small = np.array([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]])
         worst = np.maximum(worst, [math.sqrt(p.var(axis=0).sum()), math.sqrt(small.var(axis=1).sum())])
@@ -256,23 +246,23 @@ def _flange(trials: int, rng: np.random.Generator) -> tuple[float, float]:
 def _gain(name: str, rng: np.random.Generator) -> float:
     """Return how many times as many configurations a robot reaches with the fourth cup, at a place drawn for it."""
     robot, cups = with_cups(load_robot(name))
-    wanted = poses(cups)
+    wanted = hexapod.poses(cups)
     place = fixture_at((_ROBOTS[name][1], rng.uniform(-0.1, 0.1), rng.uniform(0.1, 0.3)), rng.uniform(-180.0, 180.0))
-    cups_of_four = four_cups(np.full(3, DEVICE.base), np.full(3, DEVICE.base))
+    cups_of_four = four_cups(np.full(3, hexapod.DEVICE.base), np.full(3, hexapod.DEVICE.base))
     counts = [_reached(robot, placed(place, frame), wanted) for frame in side_frames(cups_of_four)]
     return sum(counts) / counts[0]
 
 
-def _reached(robot: Robot, place: Transform, wanted: Sequence[HexapodPose]) -> int:
+def _reached(robot: Robot, place: Transform, wanted: Sequence[hexapod.HexapodPose]) -> int:
     try:
         return len(reachable(robot, place, wanted).rows)
     except InputError:  # a side of the tetrahedron may face away from the robot
         return 0
 
 
-def _poses_figure(found: Sequence[HexapodPose]) -> Figure:
+def _poses_figure(found: Sequence[hexapod.HexapodPose]) -> Figure:
     """Draw the 72 poses, the superfluous ones apart."""
-    kept = {pose.number for pose in distinct(found)}
+    kept = {pose.number for pose in hexapod.distinct(found)}
     groups = [
         (name, colour, [pose for pose in found if (pose.number in kept) == inside])
         for name, colour, inside in (("kept", AFTER, True), ("superfluous", BEFORE, False))
@@ -280,11 +270,11 @@ def _poses_figure(found: Sequence[HexapodPose]) -> Figure:
     return poses_figure(groups)
 
 
-def _distances_figure(found: Sequence[HexapodPose]) -> Figure:
+def _distances_figure(found: Sequence[hexapod.HexapodPose]) -> Figure:
     """Draw angle and distance between all pairs of poses."""
-    near = set(near_equal(found))
+    near = set(hexapod.near_equal(found))
     pairs = list(combinations(found, 2))
-    apart = np.array([distance(a, b) for a, b in pairs]) * [np.degrees(1.0), 1e3]
+    apart = np.array([hexapod.distance(a, b) for a, b in pairs]) * [np.degrees(1.0), 1e3]
     is_near = np.array([(a.number, b.number) in near for a, b in pairs])
     traces = []
     for name, colour, mask in (("pairs", AFTER, ~is_near), ("near-equal pairs", "#b3261e", is_near)):

@@ -10,43 +10,16 @@ from typing import Final
 import numpy as np
 
 from papers import Progress
+from papers.irb120_devices import setups
 from papers.irb120_devices.instruments import accuracy, tool_alone
-from papers.irb120_devices.setups import (
-    SETUPS,
-    Calibrated,
-    Setup,
-    Truth,
-    calibrate,
-    deviations,
-    driven,
-    nest_errors,
-    number_by_o1,
-    printed,
-    running_out,
-    shares,
-    sphere_test,
-    twin_of,
-    uncalibrated,
-    visible_configurations,
-)
+from papers.irb120_devices.setups import SETUPS, Calibrated, Setup, Truth, calibrate, driven, twin_of
 from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
 from papers.texts import Rows, told
-from papers.traces import in_space, scatter
+from papers.traces import coordinates, in_space, scatter, scene
 from truearm.engine.choosing.zones import identify_zones
 from truearm.engine.data.statistics import Spread
-from truearm.engine.document.drawing import (
-    AFTER,
-    BEFORE,
-    COLOURS,
-    Figure,
-    axis,
-    figure,
-    logarithmic_axis,
-    rounded,
-    rounded_to,
-    scene_axis,
-)
+from truearm.engine.document.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure, logarithmic_axis, rounded
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
 from truearm.engine.twin.devices import DEVICES
@@ -152,7 +125,7 @@ def study(
         tables,
         figures,
         texts,
-        printed={_PARAMETERS[setup.name]: printed(setup.truth) for setup in SETUPS},
+        printed={_PARAMETERS[setup.name]: setups.printed(setup.truth) for setup in SETUPS},
         why=drawn[0].why,
     )
 
@@ -202,13 +175,13 @@ def _one_setup(
 ) -> tuple[Calibrated, Figures, Array]:
     """Calibrate in one set-up; return the robot, figures, and its errors [mm]."""
     name, candidates = setup.name, settings.candidates
-    truth = Truth.of(twin, visible_configurations(setup, settings.unseen, rng)[0])
+    truth = Truth.of(twin, setups.visible_configurations(setup, settings.unseen, rng)[0])
     robot = calibrate(setup, twin, candidates, rng)
     errors = robot.errors(truth)
     left = Spread.of(errors)
     by_chance = Spread.of(calibrate(setup, twin, candidates, rng, chosen=False).errors(truth))
     figures: Figures = {
-        "before": _mean_and_maximum(name, Spread.of(uncalibrated(setup, truth))),
+        "before": _mean_and_maximum(name, Spread.of(setups.uncalibrated(setup, truth))),
         "after": {f"{name}, {setup.configurations} configurations: mean": 1e3 * left.mean}
         | {f"{name}: maximum": 1e3 * left.max},
         "by chance": {f"{name}, configurations drawn by chance: mean": 1e3 * by_chance.mean},
@@ -229,9 +202,9 @@ def _one_setup(
         ("numbers", "nests measured on the tool beforehand", True),
         ("nests found", "nests found with the robot", False),
     ):
-        figures[table] = {f"{name}, {words}": number_by_o1(setup, candidates, rng, tool_known=known)}
-    figures["visible"] = {f"{name}, {what}": share for what, share in shares(setup, _SHOWN, rng).items()}
-    figures[_PARAMETERS[name]] = deviations(robot.robot)
+        figures[table] = {f"{name}, {words}": setups.number_by_o1(setup, candidates, rng, tool_known=known)}
+    figures["visible"] = {f"{name}, {what}": share for what, share in setups.shares(setup, _SHOWN, rng).items()}
+    figures[_PARAMETERS[name]] = setups.deviations(robot.robot)
     return robot, figures, 1e3 * errors
 
 
@@ -242,8 +215,9 @@ def _nests(rng: np.random.Generator) -> dict[str, float]:
     for artefact, setup in (("triangular", planar), ("spatial", spatial)):
         device = setup.device
         size = device.size if isinstance(device, Artefact) else None
-        for instrument, sigma, of in (("laser tracker", tracker.device.sigma, None), ("C-Track", device.sigma, size)):
-            for nest, error in enumerate(nest_errors(setup, sigma, of, rng), 1):
+        by = {"laser tracker": (tracker.device.sigma, None), "C-Track": (device.sigma, size)}
+        for instrument, noise in by.items():
+            for nest, error in enumerate(setups.nest_errors(setup, *noise, rng), 1):
                 found[f"{artefact} artefact, {instrument}, nest {nest}"] = 1e3 * float(error)
     return found
 
@@ -252,7 +226,9 @@ def _crossed(settings: _Settings, rng: np.random.Generator) -> tuple[Twin, dict[
     """Calibrate one twin in all set-ups and judge each where the others see it."""
     alike = [replace(setup, payload=SETUPS[0].payload, nests=SETUPS[0].nests) for setup in SETUPS]
     twin = twin_of(alike[0], SETUPS[0].truth)
-    truths = {setup.name: Truth.of(twin, visible_configurations(setup, settings.unseen, rng)[0]) for setup in alike}
+    truths = {
+        setup.name: Truth.of(twin, setups.visible_configurations(setup, settings.unseen, rng)[0]) for setup in alike
+    }
     made = {setup.name: calibrate(setup, twin, settings.candidates, rng) for setup in alike}
     rows: dict[str, float] = {}
     for one, robot in made.items():
@@ -277,7 +253,7 @@ def _spheres(
     rows: dict[str, float] = {}
     for setup, nest, points in tests:
         if setup in made:
-            missed = 1e3 * sphere_test(made[setup], twin, nest, min(points, settings.unseen), rng)
+            missed = 1e3 * setups.sphere_test(made[setup], twin, nest, min(points, settings.unseen), rng)
             words = _sphere_words(setup, nest, points)
             rows |= {f"{words}: mean": float(missed.mean()), f"{words}: standard deviation": float(missed.std())}
             rows[f"{words}: maximum"] = float(np.abs(missed).max())
@@ -320,7 +296,7 @@ def _zones_words(model: str, count: int, divisions: tuple[int, int, int] | None)
 def _zones(settings: _Settings, rng: np.random.Generator) -> dict[str, float]:
     """Return errors of the models for zones, and of one for the whole [mm]."""
     nominal = driven()
-    twin = running_out(truth_twin(nominal, SETUPS[0].truth, rng))
+    twin = setups.running_out(truth_twin(nominal, SETUPS[0].truth, rng))
     nominal = nominal.with_payload(twin.robot.payload)
     read = measure(twin, nominal.random_configurations(max(settings.training), rng), _NOISE, rng)
     truth = Truth.of(twin, nominal.random_configurations(settings.unseen, rng))
@@ -350,16 +326,10 @@ def _zones(settings: _Settings, rng: np.random.Generator) -> dict[str, float]:
 def _places_figure(places: Mapping[str, Array]) -> Figure:
     """Draw where nests were measured."""
     traces = [
-        in_space(
-            f"{name}, {len(at)}",
-            "markers",
-            [rounded_to(at[:, k], 4) for k in range(3)],
-            marker={"size": 4, "color": colour},
-        )
+        in_space(f"{name}, {len(at)}", "markers", coordinates(at, 4), marker={"size": 4, "color": colour})
         for (name, at), colour in zip(places.items(), COLOURS, strict=True)
     ]
-    scene = {f"{letter}axis": scene_axis(f"{letter} [m]") for letter in "xyz"} | {"aspectmode": "data"}
-    return figure(traces, 460, scene=scene)
+    return figure(traces, 460, scene=scene("m"))
 
 
 def _errors_figure(drawn: Sequence[Mapping[str, Array]]) -> Figure:

@@ -15,23 +15,9 @@ import numpy as np
 from papers import Progress
 from papers.katana.robot import TIP, katana, published
 from papers.katana.tilting import tilting_from_inclinometers, twin
+from papers.katana_devices import setup
 from papers.katana_devices.page import OnPage, drawn_pages
-from papers.katana_devices.setup import (
-    ATTACHMENT,
-    DOCUMENT,
-    LOW_COST,
-    MIDDLE,
-    OPTOTRAK,
-    PLACE,
-    POINT,
-    RADIUS,
-    REFLECTORS,
-    STARTS,
-    USED,
-    VIEWS,
-    Counts,
-    Start,
-)
+from papers.katana_devices.setup import LOW_COST, OPTOTRAK, STARTS, USED, Counts, Start
 from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
 from papers.texts import Rows, told
@@ -118,8 +104,10 @@ def _one(seed: Seed, counts: Counts) -> tuple[Figures, _Drawn]:
     fit = tilting_from_inclinometers(nominal, twin(published("standard")), rng)
     starts: dict[Start, Robot] = {"geometry alone": nominal, "tilting first": fit.robot}
     others = nominal.random_configurations(counts.unseen, rng)
-    at_end, with_pencil = (_placed(published("standard"), places) for places in (ATTACHMENT.targets, REFLECTORS))
-    end, tip = (truth.frames(others)[TIP][:, :3, 3] for truth in (at_end, with_pencil))
+    at_end, with_pencil = (
+        _placed(published("standard"), places) for places in (setup.ATTACHMENT.targets, setup.REFLECTORS)
+    )
+    end, tip = (twin_at.frames(others)[TIP][:, :3, 3] for twin_at in (at_end, with_pencil))
 
     def before(data: Dataset, true: Array) -> _Reached:
         data = _without_deviations(data)
@@ -129,7 +117,7 @@ def _one(seed: Seed, counts: Counts) -> tuple[Figures, _Drawn]:
         model = named_model("geometric")
         return {name: identify(start, _without_deviations(data), model) for name, start in starts.items()}
 
-    printed = {name: _measured(device, nominal, at_end, count, rng) for name, (device, count) in DOCUMENT.items()}
+    printed = {name: _measured(device, nominal, at_end, count, rng) for name, (device, count) in setup.DOCUMENT.items()}
     of_document = {
         (name, start): _reached(found, data, others, end)
         for name, data in printed.items()
@@ -137,9 +125,9 @@ def _one(seed: Seed, counts: Counts) -> tuple[Figures, _Drawn]:
     }
     campaigns = {}
     for device in USED:
-        led = device if device.tool is None else replace(device, tool=POINT)
+        led = device if device.tool is None else replace(device, tool=setup.POINT)
         if isinstance(led, PencilCircle):
-            led = replace(led, centre=MIDDLE, radius=RADIUS)
+            led = replace(led, centre=setup.MIDDLE, radius=setup.RADIUS)
         campaigns[device.name] = _measured(led, nominal, with_pencil, counts.of(device.name), rng)
     campaigns[LOW_COST] = together(campaigns[TOUCH_UP.name], campaigns[DRAWN_CIRCLE.name])
     fits = {(name, start): found for name, data in campaigns.items() for start, found in fitted(data).items()}
@@ -147,7 +135,7 @@ def _one(seed: Seed, counts: Counts) -> tuple[Figures, _Drawn]:
     views = _views(nominal, nominal.random_configurations(_DRAWN_AT_RANDOM, rng))
     correctors = {f"{name}, {start}": fits[name, start] for name in (MARKERS.name, LOW_COST) for start in STARTS}
     pages = drawn_pages(correctors, rng)
-    in_place = nominal.with_frames(PLACE, ATTACHMENT.targets)
+    in_place = nominal.with_frames(setup.PLACE, setup.ATTACHMENT.targets)
     own = "before, base and tool fitted"
     first: Start = "tilting first"
     seen, unseen = _closed_loops({name: reached[name, first] for name in _INSTRUMENTS})
@@ -252,14 +240,14 @@ def _measured(device: Device, nominal: Robot, truth: Twin, count: int, rng: np.r
 
 
 def _placed(robot: Robot, places: Mapping[str, tuple[float, float, float]]) -> Twin:
-    return twin(robot.with_frames(PLACE, places))
+    return twin(robot.with_frames(setup.PLACE, places))
 
 
 def _views(nominal: Robot, joints: Array) -> dict[str, float]:
     """Return what share of configurations instruments see [%]."""
     return {
-        words: 100 * float(device.visible(nominal.with_frames(PLACE, places), joints).any(axis=1).mean())
-        for words, (device, places) in VIEWS.items()
+        words: 100 * float(device.visible(nominal.with_frames(setup.PLACE, places), joints).any(axis=1).mean())
+        for words, (device, places) in setup.VIEWS.items()
     }
 
 

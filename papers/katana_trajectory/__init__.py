@@ -19,11 +19,11 @@ from papers.katana.tilting import TILTING, tilting_from_inclinometers, twin, wit
 from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
 from papers.texts import told
-from papers.traces import in_space, scatter
+from papers.traces import in_space, scatter, scene
 from truearm.compensation.corrected_path import corrected, path_error
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.document.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure, rounded, scene_axis
+from truearm.engine.document.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure, rounded
 from truearm.engine.document.planning_figures import joint_trajectories
 from truearm.engine.motion.cell import skeleton
 from truearm.engine.motion.joint_motion import JointMotion, joint_motion
@@ -246,9 +246,8 @@ def _robot_figure(first: _Drawn) -> Figure:
             ("arm", arm, AFTER, "lines+markers", 7),
         )
     ]
-    scene: Figure = {f"{letter}axis": scene_axis(f"{letter} [mm]") for letter in "xyz"}
-    scene |= {"aspectmode": "data", "camera": {"eye": {"x": 1.9, "y": 2.3, "z": 1.3}, "center": {"z": -0.2}}}
-    return figure(traces, 460, scene=scene)
+    camera = {"eye": {"x": 1.9, "y": 2.3, "z": 1.3}, "center": {"z": -0.2}}
+    return figure(traces, 460, scene=scene("mm", camera=camera))
 
 
 def _curve(first: _Drawn, name: str, values: Array, colour: str, unit: str, dash: str = "solid") -> Figure:

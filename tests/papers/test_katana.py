@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from tests.papers.small import row, small
 
-from papers import katana_influence, katana_tilting, katana_trajectory
+from papers import katana_influence, katana_tilting
 from papers.katana.pose_errors import pose_errors, tip_poses, true_poses, zxz
 from papers.katana.robot import NAMES, TIP, Published, deviations, katana, published
 from papers.katana.tilting import TILTING, compliance, twin, with_tilting
@@ -96,15 +97,14 @@ def test_means_of_table_4_6_are_those_of_its_ten_rows(method: str) -> None:
     assert rows[-1] == float(unseen[f"{method}, largest"])
 
 
-def median(found: Study, table: str, what: str) -> float:
-    (row,) = (row for t in found.tables if t.title == table for row in t.rows if row.what == what)
-    return row.median
+def median(found: Study, words: str, what: str) -> float:
+    return row(found, words, what).median
 
 
 def test_influence() -> None:
-    found = katana_influence.study(2, lambda _: None, count=24, unseen=20)
+    found = small("katana-influence")
     assert found.seeds == 2
-    assert {"agrees", "differs"} <= {row.verdict for row in found.rows}
+    assert {"agrees", "differs"} <= {one.verdict for one in found.rows}
     table = "The methods side by side, on unseen poses"
     joint, one_by_one = (
         median(found, table, f"Table 3.2: {method}")
@@ -129,17 +129,17 @@ def test_influence() -> None:
 
 
 def test_tilting() -> None:
-    found = katana_tilting.study(1, lambda _: None, count=40, unseen=60)
+    found = small("katana-tilting")
     left = "What is left of the conventional calibration's error on unseen poses"
     assert median(found, left, "two-stage, tilting first") < 15
     assert median(found, left, "before any calibration") > 100
     constants = next(table for table in found.tables if table.title.startswith("Constants"))
-    for row in constants.rows[:-1]:
-        assert row.verdict == "by construction"
+    for constant in constants.rows[:-1]:
+        assert constant.verdict == "by construction"
     (ten,) = (table.rows for table in found.tables if table.title.startswith("|dP| of ten"))
     assert len(ten) == 30
     for column in range(3):
-        ranked = [row.median for row in ten[10 * column : 10 * column + 10]]
+        ranked = [one.median for one in ten[10 * column : 10 * column + 10]]
         assert ranked == sorted(ranked)
     side_by_side = "The methods side by side, on unseen poses"
     by_influence, tilting, conventional = (
@@ -153,13 +153,13 @@ def test_tilting() -> None:
     assert tilting < 0.1 * by_influence
     assert tilting < 0.15 * conventional
     contradictions = found.tables[-1].rows
-    assert [row.median < 0 for row in contradictions[:3]] == [False, False, True]
+    assert [one.median < 0 for one in contradictions[:3]] == [False, False, True]
     assert contradictions[-1].verdict == "differs"
     assert {picture.name for picture in found.pictures} == {"poses", "errors"}
 
 
 def test_trajectory() -> None:
-    found = katana_trajectory.study(1, lambda _: None, step=0.3, poses=40)
+    found = small("katana-trajectory")
     predicted = "Predicted distance from the circle, by cause"
     half, full, stiffness = (
         median(found, predicted, f"{cause}, mean") for cause in ("tilting", "tilting, full gap", "stiffness alone")

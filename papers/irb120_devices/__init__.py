@@ -269,21 +269,12 @@ def _instruments(settings: _Settings, rng: np.random.Generator) -> tuple[Figures
     figures: Figures = {**{table: {} for table in _COUNTS}, "loops": {}}
     why: dict[str, dict[str, str]] = {table: {} for table in figures}
     for device in settings.devices:
-        name = device.name
         for table, count in _COUNTS.items():
-            if count > _COUNT and name not in _ONE_NUMBER:
-                continue
-            one = accuracy(device, nominal, twin, truth, count, rng)
-            mean = f"{name}: mean"
-            figures[table] |= {mean: 1e3 * float(one.after.mean()), f"{name}: maximum": 1e3 * float(one.after.max())}
-            read = f"{one.numbers} numbers of {device.sigma * 1e3:g} mm"
-            why[table][mean] = f"{read}, {'in the world' if one.anchored else 'up to a rigid motion'}."
-            if count == _COUNT and not one.anchored:
-                row = f"{name}: directions not seen"
-                unseen = "; ".join(["where the base stands and how it is turned (6)", *one.unobservable])
-                why["loops"][row] = unseen + (". The last is the size of all." if "size" in one.gauges else ".")
-                figures["loops"][row] = float(6 + len(one.unobservable))
-                figures["loops"][f"{name}: mean but for a change of size [mm]"] = 1e3 * float(one.sized.mean())
+            if count == _COUNT or device.name in _ONE_NUMBER:
+                rows, said = accuracy(table, device, nominal, twin, truth, count, rng)
+                for into in rows if count == _COUNT else (table,):
+                    figures[into] |= rows[into]
+                    why[into] |= said[into]
     figures["tool"] = tool_alone(nominal, twin, truth, _TOUCHES, rng)
     return figures, why
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from papers.irb120 import ELASTIC
 from papers.irb120_devices.setups import Truth
+from papers.seeds import Figures
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.fit.fit import Fit, identify, place
@@ -28,26 +27,20 @@ _CONVENTIONS = frozenset(
 _ON_AXIS_6 = frozenset({"alpha_6", "a_6", "compliance_6"})
 
 
-@dataclass(frozen=True, eq=False)
-class Accuracy:
-    """What an instrument makes of the robot."""
-
-    #: Whether it says where the robot stands. Where it does not, errors are those left by the best rigid motion.
-    anchored: bool
-    after: Array  #: Position errors of its own targets at unseen configurations [m], of the identified robot.
-    sized: Array  #: The same, a change of size taken out as well.
-    gauges: tuple[str, ...]  #: What nobody measured: ``base``, ``size``.
-    #: What its readings leave open of the arm itself, beside what no instrument sees, as combinations.
-    unobservable: tuple[str, ...]
-    numbers: int  #: How many numbers it read.
+#: Ours by table and row, and what is to be said of it.
+Said = tuple[Figures, dict[str, dict[str, str]]]
 
 
 def accuracy(
-    device: Device, nominal: Robot, twin: Twin, truth: Truth, count: int, rng: np.random.Generator
-) -> Accuracy:
-    """Calibrate a twin with an instrument and judge the robot at configurations that it has not seen.
+    table: str, device: Device, nominal: Robot, twin: Twin, truth: Truth, count: int, rng: np.random.Generator
+) -> Said:
+    """Calibrate a twin with an instrument and judge the robot at configurations that it has not seen [mm].
+
+    Where the instrument does not say where the robot stands, errors are those left by the best rigid motion, and the
+    table ``loops`` has what its readings leave open of the arm itself, beside what no instrument sees.
 
     Args:
+        table: Of the errors.
         nominal: With the payload of the twin.
         count: Number of configurations.
     """
@@ -59,14 +52,19 @@ def accuracy(
     if not data.anchored:
         after = _moved(after, truly)
     read = [v for v in (data.position, data.distance, data.height) if v is not None]
-    return Accuracy(
-        anchored=data.anchored,
-        after=_lengths(after - truly),
-        sized=_lengths(_resized(after, truly) - truly),
-        gauges=gauge_freedoms(data),
-        unobservable=_unobservable(fit, data),
-        numbers=sum(int(np.isfinite(v).sum()) for v in read) + 3 * int(data.has_orientation.sum()),
-    )
+    numbers = sum(int(np.isfinite(v).sum()) for v in read) + 3 * int(data.has_orientation.sum())
+    errors, name = _lengths(after - truly), device.name
+    rows = {f"{name}: mean": 1e3 * float(errors.mean()), f"{name}: maximum": 1e3 * float(errors.max())}
+    where = "in the world" if data.anchored else "up to a rigid motion"
+    said = {table: {f"{name}: mean": f"{numbers} numbers of {device.sigma * 1e3:g} mm, {where}."}}
+    if data.anchored:
+        return {table: rows}, said
+    row, unobservable = f"{name}: directions not seen", _unobservable(fit, data)
+    unseen = "; ".join(["where the base stands and how it is turned (6)", *unobservable])
+    said["loops"] = {row: unseen + (". The last is the size of all." if "size" in gauge_freedoms(data) else ".")}
+    sized = 1e3 * float(_lengths(_resized(after, truly) - truly).mean())
+    loops = {row: float(6 + len(unobservable)), f"{name}: mean but for a change of size [mm]": sized}
+    return {table: rows, "loops": loops}, said
 
 
 def tool_alone(

@@ -15,7 +15,7 @@ from papers import Progress
 from papers.hexapod_place import PLACE, poses_figure, touched
 from papers.irb120 import REGION, without_beta
 from papers.irb120_hexapod.spheres import TRACKER, spheres
-from papers.irb120_hexapod.ways import TURNS, ways
+from papers.irb120_hexapod.ways import TURNS, Bench, ways
 from papers.irb120_hexapod.worn import calibrated, in_base, tracked, worn_twin
 from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
@@ -157,7 +157,7 @@ def _one(seed: Seed, unseen: int, coarser: int) -> tuple[Figures, _Missed]:
     figures["repeatability"] |= {f"{name}, all joints from below": 1e3 * at for name, at in one_side.items()}
     of_spheres, missed = spheres(twin, model, rng, coarser)
     figures |= of_spheres
-    figures |= ways(twin, nominal, beta, poses(cups_of_beta), rows, read, truth, rng, coarser)
+    figures |= ways(Bench(twin, nominal, beta, poses(cups_of_beta), rng, coarser), rows, read, truth)
     return figures, missed
 
 

@@ -21,18 +21,10 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
 from truearm.engine.twin.twin import Twin
+from truearm.hexapod import rehearsal
 from truearm.hexapod.places import plain_frame, world_frame
 from truearm.hexapod.reachable import reachable
-from truearm.hexapod.rehearsal import (
-    SetUp,
-    ToolChanger,
-    ballbar,
-    cups_dataset,
-    joined,
-    measure_poses,
-    set_up,
-    with_fourth,
-)
+from truearm.hexapod.rehearsal import SetUp, ToolChanger, ballbar, cups_dataset, joined, measure_poses, set_up
 from truearm.hexapod.sheet import PlannedRow, four_cups, side_frames
 
 #: A fixture that lies flat before the robot, and two more at its sides.
@@ -49,15 +41,15 @@ _NEAR: Final = 0.200
 
 
 @dataclass(frozen=True, eq=False)
-class _Bench:
+class Bench:
     """What all sessions of a seed share."""
 
-    twin: Twin
-    nominal: Robot
-    drive: Robot
-    wanted: tuple[HexapodPose, ...]
-    rng: np.random.Generator
-    coarser: int
+    twin: Twin  #: The true robot.
+    nominal: Robot  #: The nominal robot, with its load.
+    drive: Robot  #: As its controller has it, calibrated well enough for the range of the ballbar.
+    wanted: tuple[HexapodPose, ...]  #: The device's poses for this tool.
+    rng: np.random.Generator  #: For noise, lag and the tool changer.
+    coarser: int  #: Only every so many-th configuration that the robot reaches.
 
     def at(self, place: Transform) -> tuple[Array, SetUp]:
         """Set the fixture up; return the joint positions at its cups and the fixture."""
@@ -88,35 +80,20 @@ class _Bench:
         return cups_dataset(self.drive, [str(row) for row in kept], joints[kept], cups[kept])
 
 
-def ways(
-    twin: Twin,
-    nominal: Robot,
-    drive: Robot,
-    wanted: tuple[HexapodPose, ...],
-    few_rows: Sequence[PlannedRow],
-    tracker: Dataset,
-    unseen: Dataset,
-    rng: np.random.Generator,
-    coarser: int = 1,
-) -> Figures:
+def ways(bench: Bench, few_rows: Sequence[PlannedRow], tracker: Dataset, unseen: Dataset) -> Figures:
     """Calibrate in all ways.
 
     Args:
-        twin: The true robot.
-        nominal: The nominal robot, with its load.
-        drive: The robot as its controller has it, calibrated well enough for the range of the ballbar.
-        wanted: The device's poses for this tool.
+        bench: What all sessions share.
         few_rows: What is measured at the place of section 3.5.
         tracker: What a tracker read to calibrate from.
         unseen: True positions to judge by, in the twin's world.
-        rng: For noise, lag and the tool changer.
-        coarser: Only every so many-th configuration that the robot reaches.
 
     Returns:
         Error of each cup over unseen configurations and over those near the fixture [mm], and from how many
         configurations, by way.
     """
-    bench = _Bench(twin, nominal, drive, wanted, rng, coarser)
+    nominal = bench.nominal
     sessions = [(*bench.at(place), bench.plan(place)) for place in _PLACES]
     _, first, flat = sessions[0]
     data = [bench.session(rows, fixtures) for _, fixtures, rows in sessions]
@@ -141,7 +118,7 @@ def ways(
     few = bench.session(few_rows, tilted)
     all_sides = _four_sides(bench, first, flat)
     drifting = bench.session(flat, first, drift=_DRIFT)
-    attached_anew = bench.session(flat, first, changer=ToolChanger(rng))
+    attached_anew = bench.session(flat, first, changer=ToolChanger(bench.rng))
     either_side = bench.session(flat, first, either_side=True)
     turns = [one]
     for _ in range(TURNS):
@@ -159,12 +136,12 @@ def ways(
     return figures
 
 
-def _four_sides(bench: _Bench, first: SetUp, flat: Sequence[PlannedRow]) -> Dataset:
+def _four_sides(bench: Bench, first: SetUp, flat: Sequence[PlannedRow]) -> Dataset:
     """Return what is measured on all sides of a fixture with a fourth cup, in the frame of the first side."""
     nominal = four_cups(np.full(3, DEVICE.base), np.full(3, DEVICE.base))
     seen = plain_frame(first.base_cups)
     place = seen.rotation @ nominal[3] + np.array(seen.translation) + _FOURTH * bench.rng.standard_normal(3)
-    sides = with_fourth(first, place, ballbar(bench.rng))
+    sides = rehearsal.with_fourth(first, place, ballbar(bench.rng))
     parts = []
     for number, (frame, (fixtures, true)) in enumerate(zip(side_frames(nominal), sides, strict=True)):
         part = bench.session(bench.plan(placed(_FLAT, frame)) if number else flat, fixtures)

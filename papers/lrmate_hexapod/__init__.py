@@ -12,15 +12,9 @@ from numpy.typing import NDArray
 
 from papers import Progress
 from papers.campaign import Campaign, two_steps
+from papers.lrmate_hexapod import judgement
 from papers.lrmate_hexapod.identification import Cups, identified_following, identified_holding, rebased
-from papers.lrmate_hexapod.judgement import (
-    HeldOut,
-    Judgement,
-    allowed_configurations,
-    held_out,
-    judged,
-    mean_position_error,
-)
+from papers.lrmate_hexapod.judgement import HeldOut, Judgement, held_out, mean_position_error
 from papers.lrmate_hexapod.robot import BACK_DOWN, FIXTURE, FRONT_UP, drawn_twin, invented_twin, nominal_robot, touches
 from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
@@ -104,7 +98,7 @@ def study(seeds: int, progress: Progress, configurations: int = 9905, others: in
     progress("planning")
     station = _station()
     progress(f"moving the twin to {configurations} configurations")
-    joints = allowed_configurations(station.robot, configurations, np.random.default_rng(0))
+    joints = judgement.allowed_configurations(station.robot, configurations, np.random.default_rng(0))
     twin = invented_twin(station.robot)
     truth = held_out(station.robot, twin, joints)
     found, drawn = gathered(over_seeds(seeds, progress, partial(_campaign, station, twin, truth)))
@@ -135,7 +129,7 @@ def _station() -> _Station:
     """Return what is the same for every robot."""
     robot, cups = nominal_robot()
     wanted = poses(cups)
-    candidates = Postures(allowed_configurations(robot, _CANDIDATES, np.random.default_rng(1)))
+    candidates = Postures(judgement.allowed_configurations(robot, _CANDIDATES, np.random.default_rng(1)))
     tracked = plan_measurements(robot, candidates, _ELASTIC, poses=_TRACKER, rng=np.random.default_rng(1))
     plan = reachable(robot, FIXTURE, wanted, branches=(FRONT_UP, BACK_DOWN))
     return _Station(robot, wanted, plan, touches(robot), tracked.joints)
@@ -175,7 +169,7 @@ def _campaign(station: _Station, twin: Twin, truth: HeldOut, seed: Seed) -> tupl
         **dict(zip(_FOUND, (campaign.preliminary.robot, campaign.final.robot), strict=True)),
         _BY_TRACKER: _tracked(station, twin, frame, rng),
     }
-    judgements = {name: judged(model, truth) for name, model in models.items()}
+    judgements = {name: judgement.judged(model, truth) for name, model in models.items()}
     uncorrected = {_HELD[1]: held(plain)[1], _FOLLOWING[1]: identified_following(robot, campaign.data, plain)}
     gains = {
         name: 100.0 * (1.0 - judgements[name].mean / mean_position_error(model, truth))
@@ -221,12 +215,8 @@ def _steps(drawn: _Drawn) -> dict[str, float]:
 
 def _errors(drawn: _Drawn) -> Figures:
     """Return errors of every model [mm, deg, %]."""
-    figures: Figures = {
-        table: {}
-        for table in ("positions", "positions_front_up", "distances", "distances_front_up", "signs", "orientations")
-    }
-    near: dict[str, float] = {}
-    beyond: dict[str, float] = {}
+    figures: Figures = {"signs": {}, "orientations": {}}
+    near, beyond = {}, {}
     for name, one in drawn.judgements.items():
         pairs, front = one.pairs, one.pairs_front_up
         for table, three in (
@@ -235,13 +225,10 @@ def _errors(drawn: _Drawn) -> Figures:
             ("distances", (pairs.mean, pairs.deviation, pairs.maximum)),
             ("distances_front_up", (front.mean, front.deviation, front.maximum)),
         ):
-            for statistic, value in zip(("mean", "standard deviation", "maximum"), three, strict=True):
-                figures[table][f"{name}: {statistic}"] = 1e3 * value
-        mean, _, most = _spread(one.orientation)
-        figures["orientations"] |= {
-            f"{name}: mean": float(np.degrees(mean)),
-            f"{name}: maximum": float(np.degrees(most)),
-        }
+            named = zip(("mean", "standard deviation", "maximum"), three, strict=True)
+            figures.setdefault(table, {}).update({f"{name}: {what}": 1e3 * value for what, value in named})
+        mean, _, most = np.degrees(_spread(one.orientation)).tolist()
+        figures["orientations"] |= {f"{name}: mean": mean, f"{name}: maximum": most}
         if name != _NOMINAL:
             figures["signs"][name] = 100.0 * pairs.positive
             close = one.position[(drawn.away < _NEAR) & drawn.front_up]

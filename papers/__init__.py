@@ -1,7 +1,8 @@
 """Published experiments made again: ours beside the document's, over several seeds.
 
-One study a folder: `run` repeats the experiment once a seed and returns records, `tables` and `pictures` show them, and
-the folder itself tells what came out. What is here is light: the command's help reads it.
+One study a folder: its function ``study`` repeats the experiment once a seed and finds figures by table and row, and
+its ``study.yaml`` has the words and the printed numbers (:mod:`papers.texts`). What is here is light: the command's
+help reads it.
 """
 
 from __future__ import annotations

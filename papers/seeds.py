@@ -1,4 +1,4 @@
-"""The frame of every study: the loop over seeds, here or by workers, and figures of what the seeds found."""
+"""The frame of every study: the loop over seeds, here or by workers, and the figures that the seeds found."""
 
 from __future__ import annotations
 
@@ -115,8 +115,3 @@ def gathered(outcomes: Iterable[tuple[Figures, Drawn]]) -> tuple[dict[str, dict[
             for row, value in rows.items():
                 tables.setdefault(table, {}).setdefault(row, []).append(float(value))
     return tables, tuple(rest)
-
-
-def median_of(outcomes: Iterable[Outcome], figure: Callable[[Outcome], float]) -> float:
-    """Return the median over the seeds of one figure of their outcomes."""
-    return float(np.median([figure(outcome) for outcome in outcomes]))

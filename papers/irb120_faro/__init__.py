@@ -42,6 +42,9 @@ _EFFECTS: Final = (
     *("bearing-compliance", "hardening", "clearance", "fourier", "backlash", "warm-up", "transmission-error"),
     "approach",
 )
+#: Models of which the remainder is looked at, beside the elastic one.
+_COLD: Final = "elastic and five more, no warm-up"
+_WARM: Final = "elastic and six more"
 _TOGETHER: Final = ("bearing-compliance", "hardening", "warm-up", "transmission-error", "fourier", "approach")
 
 
@@ -158,10 +161,6 @@ def study(
     texts |= {"left_in": np.median(left_in), "folds": FOLDS, "searches": searches}
     texts |= {"chosen": f" It chose {chose}." if chose else ""}
     return told(__file__, seeds, every, figures, texts, why={"gains": gains})
-
-
-_COLD: Final = "elastic and five more, no warm-up"
-_WARM: Final = "elastic and six more"
 
 
 def _left_over(

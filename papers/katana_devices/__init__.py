@@ -43,6 +43,10 @@ _TRIES: Final = 10
 _INSTRUMENTS: Final = (*(device.name for device in USED), LOW_COST)
 #: What nobody measured: in words, and how many directions it is.
 _GAUGES: Final = {"base": ("where the robot stands", 6), "size": ("how large it is", 1)}
+#: The tables of what every device reaches, by start.
+_TABLES: Final[Mapping[Start, str]] = {"geometry alone": "alone", "tilting first": "first"}
+_TRUE: Final = "true mean distance"
+_SHOWN: Final = "as the page shows it"
 _COLOURS: Final = dict(zip(STARTS, ("#b3261e", AFTER), strict=True))
 
 
@@ -87,11 +91,6 @@ def study(seeds: int, progress: Progress, counts: Counts | None = None) -> Study
     texts |= {"shown": circle[_SHOWN], "true": circle[_TRUE], "registry": counts.registry, "touched": counts.touched}
     texts |= {"drawn": counts.drawn, "both": counts.of(LOW_COST), "largest_of": counts.unseen}
     return told(__file__, seeds, tables, figures, texts, why={"unobservable": unseen})
-
-
-_TABLES: Final[Mapping[Start, str]] = {"geometry alone": "alone", "tilting first": "first"}
-_TRUE: Final = "true mean distance"
-_SHOWN: Final = "as the page shows it"
 
 
 def _measured_row(name: str, counts: Counts) -> str:

@@ -18,7 +18,7 @@ import papers
 import truearm
 from papers import STUDIES, Entry, run_study
 from papers.irb120 import REGION
-from papers.seeds import Seed, median_of, over_seeds, seeds_done_by
+from papers.seeds import Figures, Seed, gathered, over_seeds, seeds_done_by
 from papers.study import Picture, Row, Study, Table, number
 from papers.texts import Rows, told
 from papers.verdicts import VERDICTS, Comparison
@@ -188,8 +188,9 @@ def test_what_studies_do_once_a_seed_can_go_to_another_process() -> None:
     assert seen == {entry.module.rpartition(".")[2] for entry in STUDIES}
 
 
-def test_the_median_is_over_the_seeds() -> None:
-    assert median_of((3.0, 1.0, 9.0), lambda outcome: 2.0 * outcome) == 6.0
+def test_figures_of_seeds_are_gathered_by_table_and_row() -> None:
+    outcomes: list[tuple[Figures, str]] = [({"t": {"a": 1, "b": 2.0}}, "x"), ({"t": {"a": 3}, "u": {"c": 4.0}}, "y")]
+    assert gathered(outcomes) == ({"t": {"a": [1.0, 3.0], "b": [2.0]}, "u": {"c": [4.0]}}, ("x", "y"))
 
 
 def test_a_region_is_drawn_from_evenly() -> None:

@@ -1,10 +1,10 @@
 """A study's words and the numbers that its document prints, read from its ``study.yaml``, beside our figures.
 
-The file has ``title``, ``source`` and ``answer``, ``tables``, ``pictures`` and ``notes``. A table has a title and words;
-``unit``, ``source`` and ``claim`` hold for all its rows, and ``sources`` and ``claims`` for single ones; ``printed`` has
-the printed numbers by row, with all their digits, and ``why`` explains rows. In these four a mapping within the mapping
-goes on where the name before it ends: ``"T1, ": {mean: 0.283}`` is of the row "T1, mean". A unit before the tables is
-that of every table without one.
+The file has ``title``, ``source`` and ``answer``, ``tables``, ``pictures`` and ``notes``. A table has a title and
+words; ``unit``, ``source`` and ``claim`` hold for all its rows, and ``sources`` and ``claims`` for single ones;
+``printed`` has the printed numbers by row, with all their digits, and ``why`` explains rows. In these four a mapping
+within the mapping goes on where the name before it ends: ``"T1, ": {mean: 0.283}`` is of the row "T1, mean". A unit
+before the tables is that of every table without one.
 """
 
 from __future__ import annotations

@@ -65,17 +65,22 @@ class _Reached:
 _Drawn = tuple[dict[str, str], dict[str, OnPage]]
 
 
-def study(seeds: int, progress: Progress, counts: Counts | None = None) -> Study:
+def study(
+    seeds: int, progress: Progress, registry: int = 48, touched: int = 24, drawn: int = 72, unseen: int = 100
+) -> Study:
     """Calibrate a twin with every instrument, compare it elsewhere and on the circle, once a seed.
 
     Args:
         seeds: How many: of the configurations, of the noise, and of the posture in which the circle is drawn.
         progress: Called with a few words at each step.
-        counts: How much is measured and judged.
+        registry: Configurations of each device of the registry but the two of the low-cost set-up.
+        touched: Contacts of the touch-up.
+        drawn: Points of the drawn circles.
+        unseen: Configurations to judge by.
     """
-    counts = Counts() if counts is None else counts
-    found, drawn = gathered(over_seeds(seeds, progress, partial(_one, counts=counts)))
-    unseen, pages = drawn[0]
+    counts = Counts(registry, touched, drawn, unseen)
+    found, seen = gathered(over_seeds(seeds, progress, partial(_one, counts=counts)))
+    not_seen, pages = seen[0]
     tables: dict[str, Rows] = {**found, "own": {row: of for row, of in found["own"].items() if np.isfinite(of).all()}}
     left = {
         (name, start): float(np.median(found[_TABLES[start]][_measured_row(name, counts)]))
@@ -90,7 +95,7 @@ def study(seeds: int, progress: Progress, counts: Counts | None = None) -> Study
     texts |= {"low_cost": left[LOW_COST, first], "point": left["point", first], "plane": left["plane", first]}
     texts |= {"shown": circle[_SHOWN], "true": circle[_TRUE], "registry": counts.registry, "touched": counts.touched}
     texts |= {"drawn": counts.drawn, "both": counts.of(LOW_COST), "largest_of": counts.unseen}
-    return told(__file__, seeds, tables, figures, texts, why={"unobservable": unseen})
+    return told(__file__, seeds, tables, figures, texts, why={"unobservable": not_seen})
 
 
 def _measured_row(name: str, counts: Counts) -> str:

@@ -61,10 +61,10 @@ STARTS: Final[tuple[Start, ...]] = ("geometry alone", "tilting first")
 class Counts:
     """How much is measured and judged."""
 
-    registry: int = 48  #: Configurations of each device of the registry but the two of the low-cost set-up.
-    touched: int = 24  #: touched, drawn: contacts of the touch-up, and points of the drawn circles.
-    drawn: int = 72
-    unseen: int = 100  #: Configurations to judge by.
+    registry: int  #: Configurations of each device of the registry but the two of the low-cost set-up.
+    touched: int  #: touched, drawn: contacts of the touch-up, and points of the drawn circles.
+    drawn: int
+    unseen: int  #: Configurations to judge by.
 
     def of(self, name: str) -> int:
         """Return how many configurations a device of the registry gets, or both of the low-cost set-up."""

@@ -6,7 +6,6 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from papers.katana_devices.setup import Counts
 from papers.study import Row, Study, Table
 from truearm.engine.twin.devices import named_device
 
@@ -27,7 +26,7 @@ SETTINGS: dict[str, tuple[int, dict[str, Any]]] = {
     ),
     "irb120-hexapod": (1, {"unseen": 40, "coarser": 6}),
     "irb120-simulation": (1, {"unseen": 60}),
-    "katana-devices": (1, {"counts": Counts(registry=16, touched=16, drawn=24, unseen=20)}),
+    "katana-devices": (1, {"registry": 16, "touched": 16, "drawn": 24, "unseen": 20}),
     "katana-influence": (2, {"count": 24, "unseen": 20}),
     "katana-tilting": (1, {"count": 40, "unseen": 60}),
     "katana-trajectory": (1, {"step": 0.3, "poses": 40}),

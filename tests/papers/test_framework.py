@@ -209,7 +209,7 @@ def test_every_study_is_a_folder_with_its_words(entry: Entry) -> None:
     assert Path(str(module.__file__)).with_name("study.yaml").is_file()
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", [entry.name for entry in STUDIES if entry.name in SETTINGS])
 def test_a_study_shows_all_that_its_file_tells(name: str) -> None:
     study = small(name)
     assert {row.verdict for row in study.rows} - {None}

@@ -1,7 +1,8 @@
 """Published experiments made again: ours beside the document's, over several seeds.
 
-One study a folder: `run` repeats the experiment once a seed and returns records, `tables` and `pictures` show them, and
-the folder itself tells what came out. What is here is light: the command's help reads it.
+One study a folder: its function ``study`` repeats the experiment once a seed and finds figures by table and row, and
+its ``study.yaml`` has the words and the printed numbers (:mod:`papers.texts`). What is here is light: the command's
+help reads it.
 """
 
 from __future__ import annotations
@@ -35,14 +36,8 @@ class Entry:
 
 
 STUDIES: Final = (
-    Entry(
-        "hexapod-device",
-        "what one ballbar between six cups can measure, and how well (Nubiola 3)",
-    ),
-    Entry(
-        "irb120-axes",
-        "one joint of an IRB 120 turned at a time: compliance, run-out and backlash (Nubiola 2.4)",
-    ),
+    Entry("hexapod-device", "what one ballbar between six cups can measure, and how well (Nubiola 3)"),
+    Entry("irb120-axes", "one joint of an IRB 120 turned at a time: compliance, run-out and backlash (Nubiola 2.4)"),
     Entry(
         "irb120-devices",
         "a simulated IRB 120 calibrated with tracker, cameras and every other instrument (Nubiola 1.7, 2.2 to 2.7)",
@@ -52,10 +47,7 @@ STUDIES: Final = (
         "a measured IRB 120: what every model leaves, and where it comes from",
         ("joints_commanded.txt", *(f"{kind}_{number}.txt" for kind in ("target", "base") for number in (1, 2, 3))),
     ),
-    Entry(
-        "irb120-hexapod",
-        "a simulated IRB 120 judged and calibrated with one ballbar (Nubiola 2.6.3 and 3.5)",
-    ),
+    Entry("irb120-hexapod", "a simulated IRB 120 judged and calibrated with one ballbar (Nubiola 2.6.3 and 3.5)"),
     Entry(
         "irb120-simulation",
         "calibration of a simulated IRB 120, without noise and with noise and wrong masses (Nubiola 2.6)",
@@ -72,17 +64,13 @@ STUDIES: Final = (
         "katana-tilting",
         "joints that tilt, found by inclinometers before the geometry, on a simulated Katana 450 (Patel 4)",
     ),
-    Entry(
-        "katana-trajectory",
-        "a circle predicted, corrected and followed by a simulated Katana 450 (Patel 5)",
-    ),
+    Entry("katana-trajectory", "a circle predicted, corrected and followed by a simulated Katana 450 (Patel 5)"),
     Entry(
         "kr5-gdt",
         "a KUKA KR 5: joint errors from circles, tolerances, seven lines before and after compensation (KR5 paper)",
     ),
     Entry(
-        "li-table",
-        "an arm of three joints that touches a tilted table of known points, fitted in bounds (Li et al.)",
+        "li-table", "an arm of three joints that touches a tilted table of known points, fitted in bounds (Li et al.)"
     ),
     Entry(
         "lrmate-hexapod",

@@ -1,14 +1,17 @@
-"""Where the base fixture stands in the studies of the hexapod device: invented, for no document prints it."""
+"""The base fixture in the studies of the hexapod device: where it stands, which is invented, and poses over it."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from papers.campaign import touching
-from truearm.engine.data.hexapod import DEVICE, triangle
+from papers.traces import coordinates, in_space, scene
+from truearm.engine.data.hexapod import DEVICE, HexapodPose, triangle
+from truearm.engine.document.drawing import CAMERA, Figure, figure, rounded_to
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
@@ -54,3 +57,27 @@ def _turned_about_y(angle: float) -> Array:
 #: At this place an IRB 120 reaches 22 poses with its elbow up, 17 of them with two wrist configurations: the counts of
 #: Nubiola, 3.5.
 PLACE: Final = fixture_at((0.30, 0.05, 0.25), 4.0, 51.0, -43.0)
+
+
+def poses_figure(groups: Sequence[tuple[str, str, Sequence[HexapodPose]]]) -> Figure:
+    """Draw the tool of poses over the base fixture, from each flange to its three cups.
+
+    Args:
+        groups: Name, colour and poses of what is drawn alike.
+    """
+    traces = [_triangles("base fixture", "#2b2f33", [triangle([DEVICE.base] * 3, "B")], 6)]
+    for name, colour, found in groups:
+        traces.append(_triangles(f"{name}: tool", colour, [pose.cups for pose in found], 2))
+        flanges = 1e3 * np.array([pose.position for pose in found])
+        said = {"text": [f"pose {pose.number}" for pose in found], "hovertemplate": "%{text}<extra></extra>"}
+        traces.append(
+            in_space(f"{name}: flange", "markers", coordinates(flanges, 1), **said, marker={"color": colour, "size": 4})
+        )
+    return figure(traces, 480, scene=scene("mm", camera=CAMERA))
+
+
+def _triangles(name: str, colour: str, triangles: Sequence[Array], width: int) -> Figure:
+    """Return closed triangles ``(3, 3)`` [m] as one trace with gaps between them."""
+    closed = [[[*rounded_to(1e3 * cups[[0, 1, 2, 0], n], 1), None] for cups in triangles] for n in range(3)]
+    places = [[place for cups in one for place in cups] for one in closed]
+    return in_space(name, "lines", places, line={"color": colour, "width": width}, hoverinfo="skip")

@@ -1,4 +1,4 @@
-"""The frame of every study: the loop over seeds, here or by workers, and figures of what the seeds found."""
+"""The frame of every study: the loop over seeds, here or by workers, and the figures that the seeds found."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from truearm.engine.base.parts import done_parts
 from truearm.engine.base.workers import Workers
 
 Outcome = TypeVar("Outcome")
-
+Drawn = TypeVar("Drawn")
+#: What one seed finds: a figure for each row, by table and row (as :data:`papers.texts.Rows` has it).
+Figures = dict[str, dict[str, float]]
 
 #: Who does the seeds of the study that runs; None where they are done here.
 _WORKERS: Final[ContextVar[Workers | None]] = ContextVar("_WORKERS", default=None)
@@ -103,6 +105,13 @@ def _silent(_: str) -> None:
     """Say nothing: nobody looks at what a worker says."""
 
 
-def median_of(outcomes: Iterable[Outcome], figure: Callable[[Outcome], float]) -> float:
-    """Return the median over the seeds of one figure of their outcomes."""
-    return float(np.median([figure(outcome) for outcome in outcomes]))
+def gathered(outcomes: Iterable[tuple[Figures, Drawn]]) -> tuple[dict[str, dict[str, list[float]]], tuple[Drawn, ...]]:
+    """Return the figures of all seeds by table and row, one value a seed that has it, and what else seeds found."""
+    tables: dict[str, dict[str, list[float]]] = {}
+    rest = []
+    for figures, more in outcomes:
+        rest.append(more)
+        for table, rows in figures.items():
+            for row, value in rows.items():
+                tables.setdefault(table, {}).setdefault(row, []).append(float(value))
+    return tables, tuple(rest)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import numpy as np
 
 from papers.irb120 import ELASTIC
-from papers.irb120_devices.twin import Truth
+from papers.irb120_devices.setups import Truth
+from papers.seeds import Figures
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.fit.fit import Fit, identify, place
@@ -29,31 +27,20 @@ _CONVENTIONS = frozenset(
 _ON_AXIS_6 = frozenset({"alpha_6", "a_6", "compliance_6"})
 
 
-@dataclass(frozen=True, eq=False)
-class Accuracy:
-    """What an instrument makes of the robot."""
-
-    device: Device  #: The instrument.
-    configurations: int  #: How many it measured.
-    #: Whether it says where the robot stands. Where it does not, errors are those left by the best rigid motion.
-    anchored: bool
-    #: before, after: position errors of its own targets at unseen configurations [m], of the nominal robot in the
-    #: frames that the same readings give it, and of the identified one.
-    before: Array
-    after: Array
-    sized: Array  #: Of the identified robot, a change of size taken out as well.
-    gauges: tuple[str, ...]  #: What nobody measured: ``base``, ``size``.
-    #: What its readings leave open of the arm itself, beside what no instrument sees, as combinations.
-    unobservable: tuple[str, ...]
-    numbers: int  #: How many numbers it read.
+#: Ours by table and row, and what is to be said of it.
+Said = tuple[Figures, dict[str, dict[str, str]]]
 
 
 def accuracy(
-    device: Device, nominal: Robot, twin: Twin, truth: Truth, count: int, rng: np.random.Generator
-) -> Accuracy:
-    """Calibrate a twin with an instrument and judge the robot at configurations that it has not seen.
+    table: str, device: Device, nominal: Robot, twin: Twin, truth: Truth, count: int, rng: np.random.Generator
+) -> Said:
+    """Calibrate a twin with an instrument and judge the robot at configurations that it has not seen [mm].
+
+    Where the instrument does not say where the robot stands, errors are those left by the best rigid motion, and the
+    table ``loops`` has what its readings leave open of the arm itself, beside what no instrument sees.
 
     Args:
+        table: Of the errors.
         nominal: With the payload of the twin.
         count: Number of configurations.
     """
@@ -61,38 +48,31 @@ def accuracy(
     fit = identify(nominal, data, ELASTIC)
     points = _targets(device, twin)
     truly = np.concatenate([truth.places(points[name]) for name in data.targets])
-    before = _predicted(place(nominal, data), data, truth)
     after = _predicted(fit.robot, data, truth)
     if not data.anchored:
-        before, after = _moved(before, truly), _moved(after, truly)
-    return Accuracy(
-        device,
-        count,
-        data.anchored,
-        _lengths(before - truly),
-        _lengths(after - truly),
-        _lengths(_resized(after, truly) - truly),
-        gauge_freedoms(data),
-        _unobservable(fit, data),
-        sum(int(np.isfinite(v).sum()) for v in (data.position, data.distance, data.height) if v is not None)
-        + 3 * int(data.has_orientation.sum()),
-    )
-
-
-@dataclass(frozen=True)
-class ToolErrors:
-    """How far off a tool centre point is that was found by touching one point, by the number of touches [m]."""
-
-    #: nominal, calibrated, true: found on the nominal robot, on one that a tracker calibrated, and on the true one.
-    nominal: Mapping[int, float]
-    calibrated: Mapping[int, float]
-    true: Mapping[int, float]
+        after = _moved(after, truly)
+    read = [v for v in (data.position, data.distance, data.height) if v is not None]
+    numbers = sum(int(np.isfinite(v).sum()) for v in read) + 3 * int(data.has_orientation.sum())
+    errors, name = _lengths(after - truly), device.name
+    rows = {f"{name}: mean": 1e3 * float(errors.mean()), f"{name}: maximum": 1e3 * float(errors.max())}
+    where = "in the world" if data.anchored else "up to a rigid motion"
+    said = {table: {f"{name}: mean": f"{numbers} numbers of {device.sigma * 1e3:g} mm, {where}."}}
+    if data.anchored:
+        return {table: rows}, said
+    row, unobservable = f"{name}: directions not seen", _unobservable(fit, data)
+    unseen = "; ".join(["where the base stands and how it is turned (6)", *unobservable])
+    said["loops"] = {row: unseen + (". The last is the size of all." if "size" in gauge_freedoms(data) else ".")}
+    sized = 1e3 * float(_lengths(_resized(after, truly) - truly).mean())
+    loops = {row: float(6 + len(unobservable)), f"{name}: mean but for a change of size [mm]": sized}
+    return {table: rows, "loops": loops}, said
 
 
 def tool_alone(
     nominal: Robot, twin: Twin, truth: Truth, touches: tuple[int, ...], rng: np.random.Generator
-) -> ToolErrors:
-    """Return how far off a tool centre point is that was found by touching one point.
+) -> dict[str, float]:
+    """Return how far off a tool centre point is that was found by touching one point [mm], by robot and touches.
+
+    On the nominal robot, on one that a tracker calibrated, and on the true one.
 
     The right answer for a robot that errs is the tool centre point with which it errs least: the mean of where the true
     tip is, seen from the flange that the robot believes in.
@@ -112,11 +92,17 @@ def tool_alone(
         }
         return {count: float(np.linalg.norm(place - right)) for count, place in found.items()}
 
-    return ToolErrors(
-        nominal=errors(place(nominal, with_tracker)),
-        calibrated=errors(identify(nominal, with_tracker, ELASTIC).robot),
-        true=errors(twin.robot.with_effects(("compliance",)).with_values(compliance)),
-    )
+    true = twin.robot.with_effects(("compliance",)).with_values(compliance)
+    robots = {
+        "nominal": place(nominal, with_tracker),
+        "calibrated": identify(nominal, with_tracker, ELASTIC).robot,
+        "true": true,
+    }
+    return {
+        f"{name} robot, {count} touches": 1e3 * error
+        for name, robot in robots.items()
+        for count, error in errors(robot).items()
+    }
 
 
 def _targets(device: Device, twin: Twin) -> dict[str, tuple[float, ...]]:

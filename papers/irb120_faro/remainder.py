@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
 from typing import Final
 
 import numpy as np
 
+from papers.seeds import Figures
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.fit import identify
@@ -19,31 +17,11 @@ from truearm.engine.robot.robot import Robot
 FOLDS: Final = 5
 
 
-class Cause(Enum):
-    """Something that may have caused what a model leaves over; each is fitted to it."""
+def left_over(robot: Robot, data: Dataset, model: Model, seed: int) -> Figures:
+    """Return what a model leaves over [mm], each of five parts predicted by a fit to the others.
 
-    ARRIVAL = "the direction from which each joint comes"
-    ANGLE = "the angle of each joint, three harmonics"
-    ROBOT_DRIFT = "a steady drift of the whole robot"
-    JOINT_DRIFT = "a steady drift of each joint"
-
-
-@dataclass(frozen=True, eq=False)
-class Remainder:
-    """What is left over at every configuration by a robot that has not seen it [mm]."""
-
-    mean: float  #: Mean length.
-    whole: float  #: Root mean square of the length, as are the next three.
-    common: float  #: Of the part that all reflectors share.
-    turning: float  #: Of the part by which the reflectors turn together as a rigid tool.
-    rest: float  #: Of what no motion of the tool explains.
-    follows: float  #: Correlation of the common part with that of the configuration measured before.
-    #: Mean length if one more cause, fitted to what the training part leaves over, is taken out too.
-    without: Mapping[Cause, float]
-
-
-def left_over(robot: Robot, data: Dataset, model: Model, seed: int) -> Remainder:
-    """Return what a model leaves over, each of five parts predicted by a fit to the others.
+    Of the table ``remainder`` all but the mean are root mean squares of the length. Those of ``cause`` are mean lengths
+    if one more cause, fitted to what the training part leaves over, is taken out too.
 
     Args:
         data: With every target read at every configuration, in the order of measurement.
@@ -52,7 +30,7 @@ def left_over(robot: Robot, data: Dataset, model: Model, seed: int) -> Remainder
     n, count = data.configurations, len(data.targets)
     residual = np.zeros((n, count, 3))
     points = np.zeros((n, count, 3))
-    explained = {cause: np.zeros_like(residual) for cause in Cause}
+    explained: dict[str, Array] = {}
     for part in np.array_split(np.random.default_rng(seed).permutation(n), FOLDS):
         fitted = np.setdiff1d(np.arange(n), part)
         found = identify(robot, data.of_configurations(fitted), model).robot
@@ -62,19 +40,25 @@ def left_over(robot: Robot, data: Dataset, model: Model, seed: int) -> Remainder
         residual[part], points[part] = every[part], there[part]
         for cause, columns in _columns(jacobian, there, data.joints).items():
             amounts = np.linalg.lstsq(columns[fitted].reshape(-1, columns.shape[-1]), every[fitted].reshape(-1))[0]
-            explained[cause][part] = (columns @ amounts)[part]
+            explained.setdefault(cause, np.zeros_like(residual))[part] = (columns @ amounts)[part]
     common = residual.mean(axis=1, keepdims=True)
     turned = _turned(residual - common, points - points.mean(axis=1, keepdims=True))
     before, after = common[:-1, 0].reshape(-1), common[1:, 0].reshape(-1)
-    return Remainder(
-        mean=_mean(residual),
-        whole=_rms(residual),
-        common=_rms(np.broadcast_to(common, residual.shape)),
-        turning=_rms(turned),
-        rest=_rms(residual - common - turned),
-        follows=float(before @ after / np.sqrt((before @ before) * (after @ after))),
-        without={cause: _mean(residual - part) for cause, part in explained.items()},
-    )
+    follows = float(before @ after / np.sqrt((before @ before) * (after @ after)))
+    return {
+        "remainder": {
+            "mean length": _mean(residual),
+            "root mean square": _rms(residual),
+            "shared by all three reflectors": _rms(np.broadcast_to(common, residual.shape)),
+            "turn of the tool about their middle": _rms(turned),
+            "what no motion of the tool explains": _rms(residual - common - turned),
+        },
+        "cause": {
+            "nothing more": _mean(residual),
+            **{cause: _mean(residual - part) for cause, part in explained.items()},
+            "correlation with the configuration before [1]": follows,
+        },
+    }
 
 
 def _mean(errors: Array) -> float:
@@ -92,7 +76,7 @@ def _turned(errors: Array, arms: Array) -> Array:
     return np.asarray((turns @ amounts).reshape(errors.shape))
 
 
-def _columns(jacobian: Array, points: Array, joints: Array) -> dict[Cause, Array]:
+def _columns(jacobian: Array, points: Array, joints: Array) -> dict[str, Array]:
     """Return for each possible cause the columns ``(n, targets, 3, parameters)`` that it would be a sum of."""
     n = len(points)
     time = np.linspace(-1.0, 1.0, n)
@@ -107,10 +91,10 @@ def _columns(jacobian: Array, points: Array, joints: Array) -> dict[Cause, Array
 
     steady = np.repeat(time[:, None], joints.shape[1], axis=1)
     return {
-        Cause.ARRIVAL: turning(moves),
-        Cause.ANGLE: turning(*harmonics),
-        Cause.ROBOT_DRIFT: rigid * time[:, None, None, None],
-        Cause.JOINT_DRIFT: turning(steady),
+        "direction of arrival of each joint": turning(moves),
+        "angle of each joint, three harmonics": turning(*harmonics),
+        "steady drift of the whole robot": rigid * time[:, None, None, None],
+        "steady drift of each joint": turning(steady),
     }
 
 

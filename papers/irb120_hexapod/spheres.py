@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from papers import regions
-from papers.irb120 import without_beta
+from papers.irb120 import REGION, without_beta
 from papers.irb120_hexapod.worn import calibrated, in_base, tracked, worn_twin
+from papers.seeds import Figures
 from truearm.engine.data.hexapod import DEVICE
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.kinematics import inverse
@@ -21,21 +20,17 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.twin.twin import Twin
 from truearm.hexapod.rehearsal import ballbar
-from truearm.validation.sphere import SphereTest, sphere_test
+from truearm.validation.sphere import sphere_test
 
 #: Deviation of a coordinate read by tracker and C-Track [m]: 0.035 mm over a scale bar, and 0.070 mm in space.
 TRACKER: Final = 0.020e-3
 C_TRACK: Final = 0.040e-3
 #: Configurations that tracker, C-Track and C-Track with the spatial artefact calibrate from.
 _TRAINING: Final = {"laser tracker": 38, "C-Track": 36, "C-Track, spatial": 35}
-#: Tables 2.12 and 2.13: readings, mean, deviation and largest [mm], by nest and model.
-PRINTED: Final[Mapping[tuple[str, str], tuple[int, str, str, str]]] = {
-    ("1", "laser tracker"): (123, "-0.105", "0.091", "0.327"),
-    ("1", "C-Track"): (123, "0.022", "0.110", "0.250"),
-    ("2", "laser tracker"): (95, "-0.148", "0.118", "0.437"),
-    ("2", "C-Track"): (95, "-0.048", "0.135", "0.363"),
-    ("1", "C-Track, spatial"): (108, "0.091", "0.126", "0.328"),
-    ("3", "C-Track, spatial"): (90, "0.146", "0.130", "0.385"),
+#: Tables 2.12 and 2.13: how many readings, by nest and model.
+_READINGS: Final = {
+    **{("1", "laser tracker"): 123, ("1", "C-Track"): 123, ("2", "laser tracker"): 95, ("2", "C-Track"): 95},
+    **{("1", "C-Track, spatial"): 108, ("3", "C-Track, spatial"): 90},
 }
 #: Where the ball is, in the robot's base frame: invented [m].
 _CENTRE: Final = (0.36, 0.0, 0.18)
@@ -49,17 +44,9 @@ _DOWN: Final = np.diag([1.0, -1.0, -1.0])
 _SPATIAL_LOAD: Final = Payload(2.6, (-0.023, 0.0, 0.100))
 
 
-@dataclass(frozen=True, eq=False)
-class Spheres:
-    """Sphere tests of one seed."""
-
-    #: taught, found: by nest and model: about the taught centre, and about the centre that fits best.
-    taught: Mapping[tuple[str, str], SphereTest]
-    found: Mapping[tuple[str, str], SphereTest]
-    nominal: float  #: Share of readings that the nominal robot leaves within the range of the ballbar.
-
-
-def spheres(twin: Twin, tracker: Robot, rng: np.random.Generator, coarser: int = 1) -> Spheres:
+def spheres(
+    twin: Twin, tracker: Robot, rng: np.random.Generator, coarser: int = 1
+) -> tuple[Figures, dict[tuple[str, str], Array]]:
     """Make all tests.
 
     Args:
@@ -67,28 +54,44 @@ def spheres(twin: Twin, tracker: Robot, rng: np.random.Generator, coarser: int =
         tracker: The document's model, calibrated by a tracker.
         rng: For configurations and noise.
         coarser: Only every so many-th reading.
+
+    Returns:
+        Figures about the taught centre and about the centre that fits best, and errors about the taught one [m].
     """
     nominal = without_beta(load_robot("irb120").with_payload(twin.robot.payload))
     spatial = _with_spatial(rng)
     spatial_nominal = without_beta(load_robot("irb120").with_payload(_SPATIAL_LOAD))
-    seen = tracked(twin, regions.IRB120.draw(_TRAINING["C-Track"], rng), C_TRACK, rng)
-    seen_spatial = tracked(spatial, regions.IRB120.draw(_TRAINING["C-Track, spatial"], rng), C_TRACK, rng)
+    seen = tracked(twin, REGION.draw(_TRAINING["C-Track"], rng), C_TRACK, rng)
+    seen_spatial = tracked(spatial, REGION.draw(_TRAINING["C-Track, spatial"], rng), C_TRACK, rng)
     models = {
         "laser tracker": (twin, in_base(tracker)),
         "C-Track": (twin, in_base(calibrated(nominal, seen))),
         "C-Track, spatial": (spatial, in_base(calibrated(spatial_nominal, seen_spatial))),
     }
-    taught, found = {}, {}
+    errors = {}
+    figures: Figures = {"sphere": {}, "about": {}}
     balls = {"triangular": _taught(twin, nominal, rng), "spatial": _taught(spatial, spatial_nominal, rng)}
-    for (nest, name), (count, *_) in PRINTED.items():
+    for (nest, name), count in _READINGS.items():
         true, model = models[name]
         ball = balls["spatial" if "spatial" in name else "triangular"]
         joints, lengths, centre = _readings(true, model, ball, nest, count // coarser, rng)
-        taught[nest, name] = sphere_test(model, joints, lengths, nest, centre)
-        found[nest, name] = sphere_test(model, joints, lengths, nest)
+        taught, found = sphere_test(model, joints, lengths, nest, centre), sphere_test(model, joints, lengths, nest)
+        errors[nest, name] = taught.errors
+        words = f"nest {nest}, {name}"
+        figures["sphere"] |= {
+            f"{words}: size of the mean, {count} readings": 1e3 * abs(taught.mean),
+            f"{words}: standard deviation": 1e3 * taught.deviation,
+            f"{words}: maximum": 1e3 * taught.largest,
+        }
+        figures["about"] |= {
+            f"{words}: size of the mean": 1e3 * abs(found.mean),
+            f"{words}: standard deviation": 1e3 * found.deviation,
+        }
     uncalibrated = nominal.with_frames(IDENTITY, nominal.tools["triangular"].targets)
     _, lengths, _ = _readings(twin, uncalibrated, balls["triangular"], "1", 123 // coarser, rng)
-    return Spheres(taught, found, float(np.isfinite(lengths).mean()))
+    in_range = 100.0 * float(np.isfinite(lengths).mean())
+    figures["about"]["nominal robot: readings within the range of the bar [%]"] = in_range
+    return figures, errors
 
 
 def _with_spatial(rng: np.random.Generator) -> Twin:
@@ -122,7 +125,7 @@ def _on_sphere(model: Robot, nest: str, centre: Array, count: int, rng: np.rando
     """Return joint positions that bring a nest to points of the sphere above the ball, ``(count, joints)``."""
     rows: list[Array] = []
     while sum(map(len, rows)) < count:
-        q = regions.IRB120.draw(4000, rng)
+        q = REGION.draw(4000, rng)
         position, rotation = model.world_poses(q, nest)
         away = position - centre
         distance = np.linalg.norm(away, axis=1)

@@ -13,6 +13,7 @@ from papers.hexapod_place import PLACE, fixture_at, placed, touched
 from papers.irb120 import ELASTIC
 from papers.irb120_hexapod.worn import calibrated
 from papers.placements import identify_placements
+from papers.seeds import Figures
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.hexapod import DEVICE, HexapodPose
 from truearm.engine.data.statistics import errors_of
@@ -20,18 +21,10 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
 from truearm.engine.twin.twin import Twin
+from truearm.hexapod import rehearsal
 from truearm.hexapod.places import plain_frame, world_frame
 from truearm.hexapod.reachable import reachable
-from truearm.hexapod.rehearsal import (
-    SetUp,
-    ToolChanger,
-    ballbar,
-    cups_dataset,
-    joined,
-    measure_poses,
-    set_up,
-    with_fourth,
-)
+from truearm.hexapod.rehearsal import SetUp, ToolChanger, ballbar, cups_dataset, joined, measure_poses, set_up
 from truearm.hexapod.sheet import PlannedRow, four_cups, side_frames
 
 #: A fixture that lies flat before the robot, and two more at its sides.
@@ -48,41 +41,15 @@ _NEAR: Final = 0.200
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """A calibration of one seed."""
-
-    configurations: int  #: How many it was made from.
-    #: everywhere, near: error of each cup over unseen configurations, and of those near the fixture [m].
-    everywhere: Array
-    near: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Ways:
-    """All calibrations of one seed."""
-
-    tracker: Way  #: By the readings of a tracker.
-    few: Way  #: With the device at the place of section 3.5.
-    one_place: Way  #: At a flat fixture before the robot.
-    three_places: Way  #: At three, frames of the places and model found in turn.
-    by_touches: Way  #: The same, each place by the joint positions at its cups and the model from the first place.
-    by_touches_in_turn: Way  #: The same again and again, each time with the model found before.
-    four_cups: Way  #: At all sides of a fixture with a fourth cup.
-    drifting: Way  #: At one place, with a bar that is never put on its calibrator.
-    attached_anew: Way  #: At one place, the tool attached anew for every pose.
-    either_side: Way  #: At one place, joints come from either side.
-
-
-@dataclass(frozen=True, eq=False)
-class _Bench:
+class Bench:
     """What all sessions of a seed share."""
 
-    twin: Twin
-    nominal: Robot
-    drive: Robot
-    wanted: tuple[HexapodPose, ...]
-    rng: np.random.Generator
-    coarser: int
+    twin: Twin  #: The true robot.
+    nominal: Robot  #: The nominal robot, with its load.
+    drive: Robot  #: As its controller has it, calibrated well enough for the range of the ballbar.
+    wanted: tuple[HexapodPose, ...]  #: The device's poses for this tool.
+    rng: np.random.Generator  #: For noise, lag and the tool changer.
+    coarser: int  #: Only every so many-th configuration that the robot reaches.
 
     def at(self, place: Transform) -> tuple[Array, SetUp]:
         """Set the fixture up; return the joint positions at its cups and the fixture."""
@@ -113,31 +80,20 @@ class _Bench:
         return cups_dataset(self.drive, [str(row) for row in kept], joints[kept], cups[kept])
 
 
-def ways(
-    twin: Twin,
-    nominal: Robot,
-    drive: Robot,
-    wanted: tuple[HexapodPose, ...],
-    few_rows: Sequence[PlannedRow],
-    tracker: Dataset,
-    unseen: Dataset,
-    rng: np.random.Generator,
-    coarser: int = 1,
-) -> Ways:
+def ways(bench: Bench, few_rows: Sequence[PlannedRow], tracker: Dataset, unseen: Dataset) -> Figures:
     """Calibrate in all ways.
 
     Args:
-        twin: The true robot.
-        nominal: The nominal robot, with its load.
-        drive: The robot as its controller has it, calibrated well enough for the range of the ballbar.
-        wanted: The device's poses for this tool.
+        bench: What all sessions share.
         few_rows: What is measured at the place of section 3.5.
         tracker: What a tracker read to calibrate from.
         unseen: True positions to judge by, in the twin's world.
-        rng: For noise, lag and the tool changer.
-        coarser: Only every so many-th configuration that the robot reaches.
+
+    Returns:
+        Error of each cup over unseen configurations and over those near the fixture [mm], and from how many
+        configurations, by way.
     """
-    bench = _Bench(twin, nominal, drive, wanted, rng, coarser)
+    nominal = bench.nominal
     sessions = [(*bench.at(place), bench.plan(place)) for place in _PLACES]
     _, first, flat = sessions[0]
     data = [bench.session(rows, fixtures) for _, fixtures, rows in sessions]
@@ -146,43 +102,46 @@ def ways(
     middle = first.base_cups.mean(axis=0) + 0.245 * plain_frame(first.base_cups).rotation[:, 2]
     near = np.linalg.norm(unseen.position - middle, axis=1) < _NEAR
 
-    def judged(robot: Robot, configurations: int, fixtures: SetUp | None = first) -> Way:
-        errors = _errors(robot, unseen, fixtures)
-        return Way(configurations, errors, errors[near])
+    figures: Figures = {"everywhere": {}, "near": {}, "configurations": {}}
 
-    def from_session(part: Dataset, fixtures: SetUp | None = first) -> Way:
-        return judged(calibrated(nominal, part), part.configurations, fixtures)
+    def judge(way: str, robot: Robot, configurations: int, fixtures: SetUp | None = first) -> None:
+        errors = _errors(robot, unseen, fixtures)
+        figures["configurations"][way] = configurations
+        for table, of in (("everywhere", errors), ("near", errors[near])):
+            figures[table] |= {f"{way}: mean": 1e3 * float(of.mean()), f"{way}: maximum": 1e3 * float(of.max())}
+
+    def judge_session(way: str, part: Dataset, fixtures: SetUp | None = first) -> None:
+        judge(way, calibrated(nominal, part), part.configurations, fixtures)
 
     one = calibrated(nominal, data[0])
     total = sum(part.configurations for part in data)
     few = bench.session(few_rows, tilted)
     all_sides = _four_sides(bench, first, flat)
     drifting = bench.session(flat, first, drift=_DRIFT)
-    attached_anew = bench.session(flat, first, changer=ToolChanger(rng))
+    attached_anew = bench.session(flat, first, changer=ToolChanger(bench.rng))
     either_side = bench.session(flat, first, either_side=True)
     turns = [one]
     for _ in range(TURNS):
         turns.append(calibrated(nominal, _by_touches(turns[-1], data, by_touch)))
-    return Ways(
-        tracker=from_session(tracker, None),
-        few=from_session(few, tilted),
-        one_place=judged(one, data[0].configurations),
-        three_places=judged(identify_placements(nominal, data, ELASTIC).robot, total),
-        by_touches=judged(turns[1], total),
-        by_touches_in_turn=judged(turns[-1], total),
-        four_cups=from_session(all_sides),
-        drifting=from_session(drifting),
-        attached_anew=from_session(attached_anew),
-        either_side=from_session(either_side),
-    )
+    judge_session("tracker", tracker, None)
+    judge_session("one place, 22 poses", few, tilted)
+    judge("one place", one, data[0].configurations)
+    judge("three places", identify_placements(nominal, data, ELASTIC).robot, total)
+    judge("three places, frames by touches", turns[1], total)
+    judge("three places, frames by touches, in turn", turns[-1], total)
+    judge_session("four cups", all_sides)
+    judge_session("one place, bar never put on its calibrator", drifting)
+    judge_session("one place, tool attached anew for every pose", attached_anew)
+    judge_session("one place, joints come from either side", either_side)
+    return figures
 
 
-def _four_sides(bench: _Bench, first: SetUp, flat: Sequence[PlannedRow]) -> Dataset:
+def _four_sides(bench: Bench, first: SetUp, flat: Sequence[PlannedRow]) -> Dataset:
     """Return what is measured on all sides of a fixture with a fourth cup, in the frame of the first side."""
     nominal = four_cups(np.full(3, DEVICE.base), np.full(3, DEVICE.base))
     seen = plain_frame(first.base_cups)
     place = seen.rotation @ nominal[3] + np.array(seen.translation) + _FOURTH * bench.rng.standard_normal(3)
-    sides = with_fourth(first, place, ballbar(bench.rng))
+    sides = rehearsal.with_fourth(first, place, ballbar(bench.rng))
     parts = []
     for number, (frame, (fixtures, true)) in enumerate(zip(side_frames(nominal), sides, strict=True)):
         part = bench.session(bench.plan(placed(_FLAT, frame)) if number else flat, fixtures)

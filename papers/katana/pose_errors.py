@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
 
 from papers.katana.robot import TIP, TOOL
+from papers.texts import printed_in
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
@@ -17,14 +19,29 @@ from truearm.engine.twin.twin import Twin
 Quantity = Literal["dX", "dY", "dZ", "dP", "dPhi", "dTheta", "dPsi"]
 #: What Tables 3.4 and 4.5 are of, and in which unit.
 QUANTITIES: Final[Mapping[Quantity, str]] = {
-    "dX": "mm",
-    "dY": "mm",
-    "dZ": "mm",
-    "dP": "mm",
-    "dPhi": "deg",
-    "dTheta": "deg",
-    "dPsi": "deg",
+    **{"dX": "mm", "dY": "mm", "dZ": "mm", "dP": "mm"},
+    **{"dPhi": "deg", "dTheta": "deg", "dPsi": "deg"},
 }
+#: Tables of studies that have a column of Tables 3.4 and 4.5: before, and after two calibrations.
+_COLUMNS: Final = {
+    "katana_influence": ("before", "simultaneous", "influence"),
+    "katana_tilting": ("before", "conventional", "two_stage"),
+}
+
+
+def same_angles() -> float:
+    """Return by how much the printed orientation errors of Tables 3.4 and 4.5 differ at most [deg]."""
+    here, there = (
+        [printed_in(Path(__file__).parents[1] / study / "study.yaml", table) for table in tables]
+        for study, tables in _COLUMNS.items()
+    )
+    rows = [f"|{quantity}|, mean" for quantity, unit in QUANTITIES.items() if unit == "deg"]
+    return max(abs(float(a[row]) - float(b[row])) for a, b in zip(here, there, strict=True) for row in rows)
+
+
+def least_mean(printed: Mapping[str, str]) -> float:
+    """Return the least possible mean |dP| of the printed mean absolute components [mm]."""
+    return math.sqrt(sum(float(printed[f"|{quantity}|, mean"]) ** 2 for quantity in ("dX", "dY", "dZ")))
 
 
 def tip_poses(robot: Robot, q: Array | Postures) -> tuple[Array, Array]:
@@ -69,12 +86,4 @@ def pose_errors(predicted: tuple[Array, Array], true: tuple[Array, Array]) -> Ma
     turned = np.abs(np.degrees((turned + np.pi) % (2 * np.pi) - np.pi))
     x, y, z = np.abs(apart).T
     phi, theta, psi = turned.T
-    return {
-        "dX": x,
-        "dY": y,
-        "dZ": z,
-        "dP": np.linalg.norm(apart, axis=1),
-        "dPhi": phi,
-        "dTheta": theta,
-        "dPsi": psi,
-    }
+    return {"dX": x, "dY": y, "dZ": z, "dP": np.linalg.norm(apart, axis=1), "dPhi": phi, "dTheta": theta, "dPsi": psi}

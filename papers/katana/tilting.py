@@ -67,12 +67,7 @@ def tilting_from_inclinometers(
         pairs: How many for inclinometers, and how many for poses.
     """
     plan = plan_tilting(
-        nominal,
-        rng,
-        inclined=pairs[0],
-        posed=pairs[1],
-        deviation=deviation_of_change(RESOLUTION),
-        pose_deviation=NOISE,
+        nominal, rng, inclined=pairs[0], posed=pairs[1], deviation=deviation_of_change(RESOLUTION), pose_deviation=NOISE
     )
     readings = compare(truth, plan.inclined, RESOLUTION, rng)
     return calibrate_tilting(nominal, readings, measure_pairs(truth, plan.posed, NOISE, rng))

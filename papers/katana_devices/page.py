@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
 from papers.katana.circle import PENCIL, motions, paths
 from papers.katana.robot import TIP, katana, published
 from papers.katana.tilting import twin
-from papers.katana_devices.setup import PLACE, POINT, RADIUS, Start
+from papers.katana_devices.setup import PLACE, POINT, RADIUS
 from truearm.compensation.corrected_path import corrected
 from truearm.engine.data.circles import fit_circle
 from truearm.engine.fit.fit import Fit
@@ -23,8 +23,6 @@ from truearm.engine.twin.devices.pencil import DRAWN_CIRCLE
 from truearm.engine.twin.twin import Twin
 
 _TIME: Final = 0.2  # s, between points of the circle that are looked at
-#: The instruments by whose calibrations the circle is corrected.
-Corrector = Literal["markers", "low-cost"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,26 +43,16 @@ class OnPage:
         return float(np.hypot(self.outward, self.height).mean())
 
 
-@dataclass(frozen=True, eq=False)
-class Pages:
-    """The circle before and after correction."""
-
-    before: OnPage  #: Commanded by the nominal robot.
-    #: By the instrument that the robot was calibrated with, and by start.
-    after: Mapping[tuple[Corrector, Start], OnPage]
-
-
-def drawn_pages(fits: Mapping[tuple[Corrector, Start], Fit], rng: np.random.Generator) -> Pages:
-    """Let the twin draw the circle of section 5.5.1, by the nominal robot and by calibrated ones."""
+def drawn_pages(fits: Mapping[str, Fit], rng: np.random.Generator) -> dict[str, OnPage]:
+    """Let the twin draw the circle of section 5.5.1, by the nominal robot, "before", and by calibrated ones."""
     circle, line = paths(_TIME)
     motion = motions(katana(PENCIL), circle, line, rng)[0]
     truth = twin(published("standard").with_frames(IDENTITY, POINT.targets))
-    before = _drawn(truth, motion.joints, motion, circle, rng)
-    after = {}
-    for key, fit in fits.items():
+    pages = {"before": _drawn(truth, motion.joints, motion, circle, rng)}
+    for name, fit in fits.items():
         commanded = corrected(fit.robot, motion, _in_base(fit, circle.position), TIP).joints
-        after[key] = _drawn(truth, commanded, motion, circle, rng)
-    return Pages(before, after)
+        pages[name] = _drawn(truth, commanded, motion, circle, rng)
+    return pages
 
 
 def _in_base(fit: Fit, path: Array) -> Array:

@@ -29,30 +29,27 @@ MIDDLE: Final = (0.0, -0.3, 0.1392893)
 RADIUS: Final = 0.1
 _CONE: Final = float(np.deg2rad(45.0))
 
-#: The document's instruments.
-DocumentInstrument = Literal["optotrak", "optotrak, 30 points", "tracker, 30 points", "cameras, 30 points"]
-#: With their configurations: 118 poses (section 3.4), 30 points (section 3.3).
-DOCUMENT: Final[Mapping[DocumentInstrument, tuple[Device, int]]] = {
-    "optotrak": (replace(MARKERS, sigma=NOISE, tool=ATTACHMENT), 118),
-    "optotrak, 30 points": (replace(MARKERS, sigma=NOISE, tool=ATTACHMENT), 30),
-    "tracker, 30 points": (replace(TRACKER, within=_CONE, tool=ATTACHMENT), 30),
-    "cameras, 30 points": (replace(SPATIAL_ARTEFACT, sigma=6e-5, tool=ATTACHMENT), 30),
+OPTOTRAK: Final = "three active markers (Optotrak)"
+_TRACKED: Final = "laser tracker, one reflector seen within 45 deg"
+#: The document's instruments with their configurations: 118 poses (section 3.4), 30 points (section 3.3).
+DOCUMENT: Final[Mapping[str, tuple[Device, int]]] = {
+    OPTOTRAK: (replace(MARKERS, sigma=NOISE, tool=ATTACHMENT), 118),
+    f"{OPTOTRAK}, 30 points": (replace(MARKERS, sigma=NOISE, tool=ATTACHMENT), 30),
+    f"{_TRACKED}, 30 points": (replace(TRACKER, within=_CONE, tool=ATTACHMENT), 30),
+    "optical CMM of 0.060 mm, 30 points": (replace(SPATIAL_ARTEFACT, sigma=6e-5, tool=ATTACHMENT), 30),
 }
 #: The hexapod's tool has to take whole poses, which five joints cannot.
 USED: Final = tuple(device for device in DEVICES if device.name != HEXAPOD.name)
 #: The document's low-cost set-up, made a measurement: touch-up and drawn circle together.
-LOW_COST: Final = "low-cost"
-#: By name: every device of the registry that is used, and both of the low-cost set-up together.
-INSTRUMENTS: Final = (*(device.name for device in USED), LOW_COST)
+LOW_COST: Final = "low-cost set-up: touch-up and drawn circle"
 
-#: Instruments that see only a part of the configurations.
-View = Literal["tracker", "tracker, three reflectors", "planar artefact", "spatial artefact", "markers"]
-VIEWS: Final[Mapping[View, tuple[Tracker | Artefact, Mapping[str, tuple[float, float, float]]]]] = {
-    "tracker": (replace(TRACKER, within=_CONE), POINT.targets),
-    "tracker, three reflectors": (TRACKER, REFLECTORS),
-    "planar artefact": (PLANAR_ARTEFACT, POINT.targets),
-    "spatial artefact": (SPATIAL_ARTEFACT, POINT.targets),
-    "markers": (MARKERS, POINT.targets),
+#: Instruments that see only a part of the configurations, in words.
+VIEWS: Final[Mapping[str, tuple[Tracker | Artefact, Mapping[str, tuple[float, float, float]]]]] = {
+    _TRACKED: (replace(TRACKER, within=_CONE), POINT.targets),
+    "laser tracker, three reflectors seen within 30 deg": (TRACKER, REFLECTORS),
+    PLANAR_ARTEFACT.name: (PLANAR_ARTEFACT, POINT.targets),
+    SPATIAL_ARTEFACT.name: (SPATIAL_ARTEFACT, POINT.targets),
+    OPTOTRAK: (MARKERS, POINT.targets),
 }
 
 #: What is known when an instrument's data are fitted.
@@ -64,11 +61,12 @@ STARTS: Final[tuple[Start, ...]] = ("geometry alone", "tilting first")
 class Counts:
     """How much is measured and judged."""
 
-    registry: int = 48  #: Configurations of each device of the registry but the two of the low-cost set-up.
-    touched: int = 24  #: touched, drawn: contacts of the touch-up, and points of the drawn circles.
-    drawn: int = 72
-    unseen: int = 100  #: Configurations to judge by.
+    registry: int  #: Configurations of each device of the registry but the two of the low-cost set-up.
+    touched: int  #: touched, drawn: contacts of the touch-up, and points of the drawn circles.
+    drawn: int
+    unseen: int  #: Configurations to judge by.
 
-    def of(self, device: Device) -> int:
-        """Return how many configurations a device of the registry gets."""
-        return {TOUCH_UP.name: self.touched, DRAWN_CIRCLE.name: self.drawn}.get(device.name, self.registry)
+    def of(self, name: str) -> int:
+        """Return how many configurations a device of the registry gets, or both of the low-cost set-up."""
+        few = {TOUCH_UP.name: self.touched, DRAWN_CIRCLE.name: self.drawn, LOW_COST: self.touched + self.drawn}
+        return few.get(name, self.registry)

@@ -132,19 +132,18 @@ class Following:
     @cached_property
     def touched(self) -> Problem:
         """The cups of the base, as if they were at the origin; metres are not whitened."""
-        robot = self.robot
         count = len(self.cups.touches)
         data = Dataset(
             source="touches",
             labels=tuple(f"B{n + 1}" for n in range(count)),
             joints=self.cups.touches,
-            joint_kinds=tuple(joint.kind for joint in robot.joints),
+            joint_kinds=tuple(joint.kind for joint in self.robot.joints),
             targets=(TOUCHING,),
             configuration=np.arange(count),
             target=np.zeros(count, np.intp),
             position=np.zeros((count, 3)),
         )
-        return Problem(robot, data, self.free, {"position": 1.0}, priors=False)
+        return Problem(self.robot, data, self.free, {"position": 1.0}, priors=False)
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Return zeros: nothing is known before."""
@@ -152,7 +151,10 @@ class Following:
 
     def at(self, vector: Array) -> Followed:
         """Compare the robot with the readings at a vector ``(parameters,)``."""
-        return Followed(self, vector)
+        readings, touched = self.readings.at(vector), self.touched.at(vector)
+        measured = np.concatenate([self.data.position[block.readings] for block in self.readings.blocks])
+        places = np.asarray(readings.residual.reshape(-1, 3) + measured)
+        return Followed(self, vector, readings, touched, measured, places, touched.residual.reshape(3, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,62 +163,38 @@ class Followed:
 
     problem: Following  #: What is evaluated.
     vector: Array  #: ``(parameters,)``.
+    readings: Evaluation  #: readings, touched: of the tool's cups and of the base's, not whitened.
+    touched: Evaluation
+    measured: Array  #: The measured positions in the order of the residual [m], ``(n, 3)``.
+    places: Array  #: Where the model has the cups of the tool in the robot's world [m], ``(n, 3)``.
+    points: Array  #: Where it has the cups of the base [m], ``(3, 3)``.
 
     @cached_property
     def residual(self) -> Array:
         """Residual of the readings in standard deviations, ``(rows,)``."""
-        frame = self._frame(self._points)
-        seen = (self._places - np.array(frame.translation)) @ frame.rotation
-        return np.asarray((seen - self._measured) / DEVICE.sigma).reshape(-1)
+        return np.asarray((self._seen(self.points) - self.measured) / DEVICE.sigma).reshape(-1)
 
     @cached_property
     def jacobian(self) -> Array:
         """Derivative of the residual, ``(rows, parameters)``; that of the frame by its points by differences."""
-        frame = self._frame(self._points)
-        moved = self._readings.jacobian.reshape(-1, 3, len(self.vector))
-        J = np.einsum("ji,njk->nik", frame.rotation, moved)
-        by_point = np.empty((*self._places.shape, 9))
-        for k in range(9):
-            there, back = (
-                (self._places - np.array(of.translation)) @ of.rotation
-                for of in (self._frame(self._points + sign * _STEP * _unit(k)) for sign in (1.0, -1.0))
-            )
+        moved = self.readings.jacobian.reshape(-1, 3, len(self.vector))
+        J = np.einsum("ji,njk->nik", self._frame(self.points).rotation, moved)
+        by_point = np.empty((*self.places.shape, 9))
+        for k, unit in enumerate(np.eye(9).reshape(9, 3, 3)):
+            there, back = (self._seen(self.points + sign * _STEP * unit) for sign in (1.0, -1.0))
             by_point[:, :, k] = (there - back) / (2.0 * _STEP)
-        J += by_point @ self._touched.jacobian
+        J += by_point @ self.touched.jacobian
         return np.asarray(J.reshape(-1, len(self.vector)) / DEVICE.sigma)
-
-    @cached_property
-    def _readings(self) -> Evaluation:
-        return self.problem.readings.at(self.vector)
-
-    @cached_property
-    def _touched(self) -> Evaluation:
-        return self.problem.touched.at(self.vector)
-
-    @property
-    def _measured(self) -> Array:
-        """The measured positions in the order of the residual [m], ``(n, 3)``."""
-        position = self.problem.data.position
-        return np.concatenate([position[block.readings] for block in self.problem.readings.blocks])
-
-    @property
-    def _places(self) -> Array:
-        """Where the model has the cups of the tool in the robot's world [m], ``(n, 3)``."""
-        return np.asarray(self._readings.residual.reshape(-1, 3) + self._measured)
-
-    @property
-    def _points(self) -> Array:
-        """Where the model has the cups of the base in the robot's world [m], ``(3, 3)``."""
-        return self._touched.residual.reshape(3, 3)
 
     def _frame(self, points: Array) -> Transform:
         found = world_frame(points, self.problem.cups.sides)
         return found.frame if self.problem.cups.corrected else found.plain
 
+    def _seen(self, points: Array) -> Array:
+        """Return the places in the frame that points of the base give [m], ``(n, 3)``."""
+        frame = self._frame(points)
+        return np.asarray((self.places - np.array(frame.translation)) @ frame.rotation)
+
 
 #: By how much a point is moved for a derivative [m].
 _STEP: Final = 1e-5
-
-
-def _unit(k: int) -> Array:
-    return np.asarray(np.eye(9)[k].reshape(3, 3))

@@ -8,18 +8,19 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.papers.small import SETTINGS, small
 
 import papers
 import truearm
 from papers import STUDIES, Entry, run_study
-from papers.regions import IRB120
-from papers.seeds import Seed, median_of, over_seeds, seeds_done_by
+from papers.irb120 import REGION
+from papers.seeds import Figures, Seed, gathered, over_seeds, seeds_done_by
 from papers.study import Picture, Row, Study, Table, number
+from papers.texts import Rows, told
 from papers.verdicts import VERDICTS, Comparison
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.workers import Given
@@ -28,7 +29,7 @@ from truearm.engine.document.drawing import axis, figure
 HOSTILE = "</script><b>"
 
 
-def small() -> Study:
+def of_three_rows() -> Study:
     rows = (
         Row("near", "mm", [0.95, 1.05, 1.0], "1.0", "Table 1"),
         Row("far", "mm", [1.3, 1.31, 1.32], "1.00", "Table 1", explanation=HOSTILE),
@@ -49,7 +50,7 @@ def small() -> Study:
 
 
 def test_a_row_has_the_verdict_of_its_figures() -> None:
-    near, far, alone = small().tables[0].rows
+    near, far, alone = of_three_rows().tables[0].rows
     assert (near.median, near.lowest, near.highest) == (1.0, 0.95, 1.05)
     assert [row.verdict for row in (near, far, alone)] == ["agrees", "differs", None]
 
@@ -68,7 +69,7 @@ def test_no_study_can_say_how_far_off_a_figure_may_be() -> None:
 
 
 def test_every_row_is_counted_and_the_counts_are_printed() -> None:
-    study = small()
+    study = of_three_rows()
     assert study.counts == dict.fromkeys(VERDICTS, 0) | {"agrees": 1, "differs": 1}
     assert study.lines()[-1] == (
         "Verdicts: agrees 1, same order 0, not worse 0, by construction 0, undecided 0, differs 1."
@@ -85,7 +86,7 @@ def test_numbers_have_three_digits(value: float, text: str) -> None:
 
 
 def test_a_study_is_written_whole(tmp_path: Path) -> None:
-    files = small().save(tmp_path / "new")
+    files = of_three_rows().save(tmp_path / "new")
     assert [path.name for path in files] == ["report.html", "study.json"]
     content = json.loads(files[1].read_text())
     assert {*content} == {
@@ -121,7 +122,7 @@ def test_a_study_is_written_whole(tmp_path: Path) -> None:
 
 
 def test_the_report_is_one_page_that_trusts_no_text() -> None:
-    page = small().html()
+    page = of_three_rows().html()
     assert HOSTILE not in page
     assert "http-equiv" in page
     assert "<link" not in page
@@ -131,7 +132,7 @@ def test_the_report_is_one_page_that_trusts_no_text() -> None:
 
 
 def test_a_report_without_a_command_shows_none() -> None:
-    assert "<pre>" not in replace(small(), command="").html()
+    assert "<pre>" not in replace(of_three_rows(), command="").html()
 
 
 def test_every_seed_has_its_own_numbers_and_says_what_it_does() -> None:
@@ -187,13 +188,14 @@ def test_what_studies_do_once_a_seed_can_go_to_another_process() -> None:
     assert seen == {entry.module.rpartition(".")[2] for entry in STUDIES}
 
 
-def test_the_median_is_over_the_seeds() -> None:
-    assert median_of((3.0, 1.0, 9.0), lambda outcome: 2.0 * outcome) == 6.0
+def test_figures_of_seeds_are_gathered_by_table_and_row() -> None:
+    outcomes: list[tuple[Figures, str]] = [({"t": {"a": 1, "b": 2.0}}, "x"), ({"t": {"a": 3}, "u": {"c": 4.0}}, "y")]
+    assert gathered(outcomes) == ({"t": {"a": [1.0, 3.0], "b": [2.0]}, "u": {"c": [4.0]}}, ("x", "y"))
 
 
 def test_a_region_is_drawn_from_evenly() -> None:
-    drawn = IRB120.draw(4000, np.random.default_rng(0))
-    low, high = IRB120.limits
+    drawn = REGION.draw(4000, np.random.default_rng(0))
+    low, high = REGION.limits
     assert drawn.shape == (4000, 6)
     assert drawn.min(axis=0) == pytest.approx(low, abs=0.01)
     assert drawn.max(axis=0) == pytest.approx(high, abs=0.01)
@@ -201,9 +203,20 @@ def test_a_region_is_drawn_from_evenly() -> None:
 
 
 @pytest.mark.parametrize("entry", STUDIES, ids=[entry.name for entry in STUDIES])
-def test_every_study_is_a_folder_that_runs_and_shows(entry: Entry) -> None:
-    assert callable(import_module(entry.module).study)
-    assert all(find_spec(f"{entry.module}.{part}") for part in ("run", "tables", "pictures"))
+def test_every_study_is_a_folder_with_its_words(entry: Entry) -> None:
+    module = import_module(entry.module)
+    assert callable(module.study)
+    assert Path(str(module.__file__)).with_name("study.yaml").is_file()
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in STUDIES if entry.name in SETTINGS])
+def test_a_study_shows_all_that_its_file_tells(name: str) -> None:
+    study = small(name)
+    assert {row.verdict for row in study.rows} - {None}
+    told = [study.answer, *study.notes, *(t.words for t in study.tables), *(row.explanation for row in study.rows)]
+    assert not any("{" in text or "}" in text for text in told)
+    page = study.html()
+    assert all(f'id="{picture.name}"' in page for picture in study.pictures)
 
 
 def test_studies_are_listed_by_name() -> None:
@@ -234,3 +247,19 @@ def test_missing_data_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     (tmp_path / "joints.txt").write_text("0 0 0 0 0 0\n")
     with pytest.raises(InputError, match=r"target_1\.txt: a file of the measured data is missing"):
         run_study("li-table", data=tmp_path)
+
+
+def test_a_file_that_speaks_of_a_row_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "study.yaml").write_text(
+        "{title: t, source: s, answer: 'of {seeds}: {first[a]:.1f}', pictures: {}, notes: ['{n}'],"
+        " tables: {first: {title: T, words: W, unit: mm, source: Table 1, printed: {a: 0.50, 'b, ': {c: 2}}}}}"
+    )
+    ours: Rows = {"a": [0.4, 0.5], "b, c [deg]": 2.0, "d": []}
+    study = told(tmp_path / "it.py", 2, {"first": ours}, {}, {"n": 7})
+    assert (study.answer, study.notes) == ("of 2: 0.5", ("7",))
+    assert [(row.what, row.unit, row.published, row.source) for row in study.rows] == [
+        ("a", "mm", "0.50", "Table 1"),
+        ("b, c", "deg", "2", "Table 1"),
+    ]
+    with pytest.raises(KeyError, match="there is no row b, c"):
+        told(tmp_path / "it.py", 2, {"first": {"a": 1.0}}, {}, {"n": 7})

@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 import pytest
-
-from papers import hexapod_device, irb120_hexapod
-from papers.study import Study
-
-
-def silent(_: str) -> None:
-    pass
-
-
-def medians(study: Study, table: int) -> dict[str, float]:
-    return {row.what: row.median for row in study.tables[table].rows}
+from tests.papers.small import medians, small
 
 
 def test_the_device() -> None:
-    study = hexapod_device.study(2, silent, trials=2000, places=False)
+    study = small("hexapod-device")
     counts, uncertainty, accuracy, drift, changer, repeated, fourth = study.tables
     assert {row.verdict for row in counts.rows[:8] if row.published is not None} == {"agrees"}
     assert {row.verdict for row in counts.rows[-2:]} == {"same order", "not worse"}
@@ -25,11 +15,11 @@ def test_the_device() -> None:
     differing = {row.what for row in uncertainty.rows if row.verdict == "differs"}
     assert differing == {f"solution {solution}, t3" for solution in (1, 2, 3, 4)}
     assert all(row.verdict == "differs" for row in accuracy.rows if row.published is not None)
-    found = medians(study, 3)
+    found = medians(study, "Drift of the bar")
     assert found["put on its calibrator before each pose: mean"] < 1.3 * found["a bar that does not drift: mean"]
     assert found["never put on its calibrator: mean"] > 1.5 * found["a bar that does not drift: mean"]
     assert max(row.highest for row in drift.rows) < 10.0  # um
-    anew = medians(study, 4)["attached anew before every pose: mean error of the cups"]
+    anew = medians(study, "The tool changer")["attached anew before every pose: mean error of the cups"]
     assert 1e3 * anew > 5 * found["never put on its calibrator: mean"]
     assert any(row.verdict == "by construction" for row in changer.rows)
     assert max(row.highest for row in repeated.rows) < 10.0
@@ -38,20 +28,20 @@ def test_the_device() -> None:
 
 
 def test_the_irb120() -> None:
-    study = irb120_hexapod.study(1, silent, unseen=40, coarser=6)
+    study = small("irb120-hexapod")
     assert {row.verdict for row in study.tables[0].rows if row.published is not None} == {"by construction"}
-    session = medians(study, 2)
+    session = medians(study, "Errors in 39")
     # A turn about axis 6 moves what is far from it, and the flange not at all.
     assert session["T1: mean"] < session["T2: mean"] < session["T3: mean"]
     assert session["flange, orientation: mean"] == pytest.approx(0.333, abs=0.08)
     one_side, either = "flange, all joints from below", "flange, joints come from either side"
-    repeatability = medians(study, 5)
+    repeatability = medians(study, "Repeatability")
     assert repeatability[one_side] == pytest.approx(0.010, abs=0.006)
     assert repeatability[either] > 2 * repeatability[one_side]
     spheres = [row for row in study.tables[6].rows if row.what.endswith("standard deviation")]
     assert len(spheres) == 6
     assert all(0.04 < row.median < 0.30 for row in spheres)
-    about_fitted = medians(study, 7)
+    about_fitted = medians(study, "The same about the centre")
     for row in spheres:
         assert about_fitted[row.what] <= row.median
     everywhere = {row.what.split(" (")[0]: row.median for row in study.tables[8].rows if row.what.endswith("mean")}

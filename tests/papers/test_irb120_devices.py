@@ -6,91 +6,68 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.papers.small import medians, small, table
 
-from papers.irb120_devices import study
-from papers.irb120_devices.setups import SETUPS, shares, twin_of, visible_configurations
-from papers.irb120_devices.twin import Truth, driven, running_out
-from papers.study import Row, Study
-from truearm.engine.twin.devices import named_device
+from papers.irb120_devices.setups import SETUPS, Truth, driven, running_out, shares, twin_of, visible_configurations
 from truearm.engine.twin.truths import truth_twin
 
 
-@pytest.fixture(scope="module")
-def small() -> Study:
-    devices = [named_device(name) for name in ("tracker", "ballbar", "point")]
-    return study(
-        1,
-        lambda _: None,
-        unseen=12,
-        candidates=100,
-        devices=devices,
-        training=(30, 150),
-        zoned=("geometric", "elastic"),
-        divisions=((2, 1, 2),),
-    )
-
-
-def medians(found: Study, title: str) -> dict[str, float]:
-    (table,) = (table for table in found.tables if table.title.startswith(title))
-    return {row.what: row.median for row in table.rows}
-
-
-def found_by(study: Study, words: str) -> tuple[Row, ...]:
-    (table,) = (table for table in study.tables if table.title.startswith(words))
-    return table.rows
-
-
-def test_the_documents_comparison(small: Study) -> None:
-    before, after = medians(small, "Before"), medians(small, "After")
+def test_the_documents_comparison() -> None:
+    found = small("irb120-devices")
+    before, after = medians(found, "Before calibration"), medians(found, "After calibration")
+    printed = {row.what: float(row.published or "nan") for row in table(found, "After calibration").rows}
     assert before["planar artefact: mean"] == pytest.approx(4.639, rel=0.25)
     for setup in SETUPS:
-        left = after[f"{setup.name}, {setup.configurations} configurations: mean"]
-        assert left == pytest.approx(float(setup.after), rel=0.7)
+        mean = f"{setup.name}, {setup.configurations} configurations: mean"
+        left = after[mean]
+        assert left == pytest.approx(printed[mean], rel=0.7)
         assert after[f"{setup.name}, the least run-out that Table 2.3 allows: mean"] < 0.7 * left
         assert left < 0.12 * before[f"{setup.name}: mean"]
     assert after["tracker, no compliance in the model: mean"] > 2.0 * after["tracker, 38 configurations: mean"]
     # Run-out in phase with gravity is taken for compliance.
-    (compliance,) = (row for row in found_by(small, "Parameters that the tracker") if row.what == "compliance_2")
+    (compliance,) = (row for row in table(found, "Parameters that the tracker").rows if row.what == "compliance_2")
     assert compliance.median > 1.2 * float(compliance.published or "nan")
-    assert len(found_by(small, "Tracker and cameras against")) == 16
-    crossed = medians(small, "Calibrated with one")
+    assert len(table(found, "Tracker and cameras against").rows) == 16
+    crossed = medians(found, "Calibrated with one")
     assert len(crossed) == 18
     assert max(crossed.values()) < 1.5
-    ballbar = [row for table in small.tables if table.title.startswith("Ballbar") for row in table.rows]
+    ballbar = [row for of in found.tables if of.title.startswith("Ballbar") for row in of.rows]
     assert len(ballbar) == 18
     assert all(
         row.median == pytest.approx(float(row.published or 0), rel=0.8) for row in ballbar if "deviation" in row.what
     )
 
 
-def test_every_instrument_and_what_closed_loops_miss(small: Study) -> None:
-    few, more = medians(small, "Every instrument"), medians(small, "Three times")
+def test_every_instrument_and_what_closed_loops_miss() -> None:
+    found = small("irb120-devices")
+    few, more = medians(found, "Every instrument"), medians(found, "Three times")
     assert few["tracker: mean"] < 0.05
     assert few["point: mean"] > 5.0 * few["tracker: mean"]
     assert more["ballbar: mean"] < few["ballbar: mean"]
-    lost = medians(small, "Directions")
+    lost = medians(found, "Directions")
     assert lost["ballbar: directions not seen"] == 6.0  # where the base stands
     assert lost["point: directions not seen"] == 7.0  # and the size
     assert lost["point: mean but for a change of size"] < few["point: mean"]
     assert not any(what.startswith("tracker") for what in lost)
 
 
-def test_zones_and_tool(small: Study) -> None:
-    zones = medians(small, "A model for each zone")
+def test_zones_and_tool() -> None:
+    found = small("irb120-devices")
+    zones = medians(found, "A model for each zone")
     one, four = (zones[f"geometric, 150 configurations, {cut}: mean"] for cut in ("one model", "2 x 1 x 2 zones"))
     assert four < one
     assert zones["elastic, 150 configurations, one model: mean"] < four
-    tool = medians(small, "A tool")
+    tool = medians(found, "A tool calibrated alone")
     assert tool["nominal robot, 36 touches"] > 3.0 * tool["true robot, 36 touches"]
     # n touches turned evenly to all sides tell the tool to sigma sqrt(3 / n) in length, the point being unknown.
     assert tool["true robot, 36 touches"] < 3.0 * 0.05 * np.sqrt(3.0 / 36.0)
-    assert len(small.pictures) == 3
+    assert len(found.pictures) == 3
 
 
 def test_visibility_by_spherical_caps() -> None:
     """Directions spread evenly over the sphere would be seen by the share of the caps: the region is near to that."""
     rng = np.random.default_rng(0)
-    tracker, planar, spatial = (shares(setup, 4000, rng).seen for setup in SETUPS)
+    tracker, planar, spatial = (shares(setup, 4000, rng)["of all configurations"] for setup in SETUPS)
     assert tracker == pytest.approx(100.0 * 3.0 * 0.5 * (1.0 - np.cos(np.radians(30.0))), rel=0.25)
     assert planar == pytest.approx(100.0 * (1.0 - np.cos(np.radians(15.0))), rel=0.25)
     assert spatial == 100.0

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from tests.papers.small import row, small
 
+from papers import katana_influence, katana_tilting
 from papers.katana.pose_errors import pose_errors, tip_poses, true_poses, zxz
-from papers.katana.printed import TABLE_3_2, TABLE_3_3, column_of_4_6
 from papers.katana.robot import NAMES, TIP, Published, deviations, katana, published
 from papers.katana.tilting import TILTING, compliance, twin, with_tilting
-from papers.katana_influence import study as influence_study
-from papers.katana_tilting import study as tilting_study
-from papers.katana_trajectory import study as trajectory_study
 from papers.study import Study
+from papers.texts import printed_in
 from truearm.engine.twin.twin import Twin
 
 
@@ -80,29 +78,33 @@ def test_twin_and_model_tilt_alike() -> None:
     assert np.median(np.linalg.norm(katana().world_poses(q, TIP)[0] - true, axis=1)) > 1e-4
 
 
-def test_printed_tables_are_those_of_the_robot_file() -> None:
-    tables: dict[Published, Mapping[str, str]] = {"standard": TABLE_3_2, "influence": TABLE_3_3}
-    for name, table in tables.items():
-        found = deviations({**published(name).values, "target_tip_y": 0.0, "target_tip_z": 0.0})
-        for parameter, value in table.items():
-            if parameter not in ("alpha 5", "d 6"):  # of the tool link, which is the tip here
-                assert found[parameter] == pytest.approx(float(value), abs=1e-9)
+@pytest.mark.parametrize(("table", "name"), [("least_squares_3_2", "standard"), ("influence_3_3", "influence")])
+def test_printed_tables_are_those_of_the_robot_file(table: str, name: Published) -> None:
+    found = deviations({**published(name).values, "target_tip_y": 0.0, "target_tip_z": 0.0})
+    printed = printed_in(katana_influence.__file__, table)
+    assert len(printed) == 17
+    for parameter, value in printed.items():
+        if parameter not in ("alpha 5", "d 6"):  # of the tool link, which is the tip here
+            assert found[parameter] == pytest.approx(float(value), abs=1e-9)
 
 
-@pytest.mark.parametrize(("column", "mean", "most"), [(0, "1.161", "1.54"), (1, "0.514", "0.75"), (2, "0.128", "0.16")])
-def test_means_of_table_4_6_are_those_of_its_ten_rows(column: int, mean: str, most: str) -> None:
-    assert column_of_4_6(column) == (mean, most)
+@pytest.mark.parametrize("method", ["before", "conventional, geometry alone", "two-stage, tilting first"])
+def test_means_of_table_4_6_are_those_of_its_ten_rows(method: str) -> None:
+    ten, unseen = (printed_in(katana_tilting.__file__, table) for table in ("ten", "unseen"))
+    rows = [float(ten[f"{method}, {rank} of 10"]) for rank in range(1, 11)]
+    assert rows == sorted(rows)
+    assert f"{sum(rows) / 10:.3f}" == unseen[f"{method}, mean"]
+    assert rows[-1] == float(unseen[f"{method}, largest"])
 
 
-def median(found: Study, table: str, what: str) -> float:
-    (row,) = (row for t in found.tables if t.title == table for row in t.rows if row.what == what)
-    return row.median
+def median(found: Study, words: str, what: str) -> float:
+    return row(found, words, what).median
 
 
 def test_influence() -> None:
-    found = influence_study(2, lambda _: None, count=24, unseen=20)
+    found = small("katana-influence")
     assert found.seeds == 2
-    assert {"agrees", "differs"} <= {row.verdict for row in found.rows}
+    assert {"agrees", "differs"} <= {one.verdict for one in found.rows}
     table = "The methods side by side, on unseen poses"
     joint, one_by_one = (
         median(found, table, f"Table 3.2: {method}")
@@ -127,17 +129,17 @@ def test_influence() -> None:
 
 
 def test_tilting() -> None:
-    found = tilting_study(1, lambda _: None, count=40, unseen=60)
+    found = small("katana-tilting")
     left = "What is left of the conventional calibration's error on unseen poses"
     assert median(found, left, "two-stage, tilting first") < 15
     assert median(found, left, "before any calibration") > 100
     constants = next(table for table in found.tables if table.title.startswith("Constants"))
-    for row in constants.rows[:-1]:
-        assert row.verdict == "by construction"
+    for constant in constants.rows[:-1]:
+        assert constant.verdict == "by construction"
     (ten,) = (table.rows for table in found.tables if table.title.startswith("|dP| of ten"))
     assert len(ten) == 30
     for column in range(3):
-        ranked = [row.median for row in ten[10 * column : 10 * column + 10]]
+        ranked = [one.median for one in ten[10 * column : 10 * column + 10]]
         assert ranked == sorted(ranked)
     side_by_side = "The methods side by side, on unseen poses"
     by_influence, tilting, conventional = (
@@ -151,13 +153,13 @@ def test_tilting() -> None:
     assert tilting < 0.1 * by_influence
     assert tilting < 0.15 * conventional
     contradictions = found.tables[-1].rows
-    assert [row.median < 0 for row in contradictions[:3]] == [False, False, True]
+    assert [one.median < 0 for one in contradictions[:3]] == [False, False, True]
     assert contradictions[-1].verdict == "differs"
     assert {picture.name for picture in found.pictures} == {"poses", "errors"}
 
 
 def test_trajectory() -> None:
-    found = trajectory_study(1, lambda _: None, step=0.3, poses=40)
+    found = small("katana-trajectory")
     predicted = "Predicted distance from the circle, by cause"
     half, full, stiffness = (
         median(found, predicted, f"{cause}, mean") for cause in ("tilting", "tilting, full gap", "stiffness alone")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.papers.small import row, small
 
 from papers.katana.robot import katana
-from papers.katana_devices import study
+from papers.katana_devices import together
 from papers.katana_devices.page import OnPage
-from papers.katana_devices.run import together
-from papers.katana_devices.setup import USED, Counts
+from papers.katana_devices.setup import USED
 from papers.study import Study
 from truearm.engine.data.observations import compared
 from truearm.engine.twin.devices import named_device
@@ -19,25 +19,20 @@ from truearm.engine.twin.twin import Twin
 
 @pytest.fixture(scope="module")
 def found() -> Study:
-    return study(1, lambda _: None, Counts(registry=16, touched=16, drawn=24, unseen=20))
-
-
-def value(found: Study, table: str, what: str) -> float:
-    (row,) = (row for t in found.tables if t.title == table for row in t.rows if row.what == what)
-    return row.median
+    return small("katana-devices")
 
 
 def test_every_device_is_in_both_tables(found: Study) -> None:
     tables = {table.title: table for table in found.tables}
     for start in ("geometry alone", "tilting first"):
         rows = tables[f"Every device, {start}"].rows
-        assert [row.what.partition(",")[0] for row in rows[1:-1]] == [device.name for device in USED]
-        assert all(np.isfinite(row.median) for row in rows)
+        assert [one.what.partition(",")[0] for one in rows[1:-1]] == [device.name for device in USED]
+        assert all(np.isfinite(one.median) for one in rows)
 
 
 def test_tilting_is_worth_more_than_the_instrument(found: Study) -> None:
     left = {
-        (start, what): value(found, f"Every device, {start}", f"{what}, 16 configurations, mean")
+        (start, what): row(found, f"Every device, {start}", f"{what}, 16 configurations, mean").median
         for start in ("geometry alone", "tilting first")
         for what in ("markers", "measurement-arm", "two-spheres")
     }
@@ -47,20 +42,20 @@ def test_tilting_is_worth_more_than_the_instrument(found: Study) -> None:
 
 def test_closed_loops_say_what_they_do_not_see(found: Study) -> None:
     table = "What closed loops do not see"
-    assert value(found, table, "five-lasers: directions that it does not see") == 6
-    assert value(found, table, "point: directions that it does not see") == 7
-    (row,) = (row for t in found.tables for row in t.rows if row.what == "plane: directions that it does not see")
-    assert "where the robot stands and how large it is" in row.explanation
+    assert row(found, table, "five-lasers: directions that it does not see").median == 6
+    assert row(found, table, "point: directions that it does not see").median == 7
+    plane = row(found, table, "plane: directions that it does not see")
+    assert "where the robot stands and how large it is" in plane.explanation
 
 
 def test_the_page_shows_a_part_of_the_true_error(found: Study) -> None:
     table = "The circle of section 5.5.1 on the page"
     seen, moved, true = (
-        value(found, table, f"before: {what}")
+        row(found, table, f"before: {what}").median
         for what in ("as the page shows it", "after the best rigid motion", "true mean distance")
     )
     assert 0.02 < seen < moved + 0.03 < true
-    after = value(found, table, "markers, tilting first: true mean distance")
+    after = row(found, table, "markers, tilting first: true mean distance").median
     assert after < 0.3 * true
     assert "Plotly" in found.html()
 

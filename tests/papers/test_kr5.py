@@ -1,12 +1,11 @@
 from __future__ import annotations
 
 import pytest
-
-from papers.kr5_gdt import study
+from tests.papers.small import small
 
 
 def test_kr5() -> None:
-    found = study(2, lambda _: None, repetitions=40)
+    found = small("kr5-gdt")
     errors, coverage, ranks, tolerances, before, reductions, models = found.tables
     assert {row.claim for row in errors.rows} == {"construction"}
     assert sum(row.verdict == "by construction" for row in errors.rows) >= 20

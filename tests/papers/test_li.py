@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.papers.small import small, table
 
-from papers.li_table import study
+from papers.li_table import METHODS, SURFACES, THEIRS, gain
 from papers.li_table.arm import (
     BEYOND,
     PLACE,
@@ -19,27 +20,21 @@ from papers.li_table.arm import (
     truth,
     verification,
 )
-from papers.li_table.run import Followed, Following
-from papers.li_table.tables import METHOD_WORDS, SURFACE_WORDS
 from papers.study import Row, Study, Table
 from truearm.calibration.calibrate import calibrate
 from truearm.validation.jobs import validate
 
-THEIRS, UNBOUNDED = METHOD_WORDS["distances"], METHOD_WORDS["unbounded"]
-TOGETHER = SURFACE_WORDS["together"]
+BOUNDED, UNBOUNDED = METHODS[THEIRS], METHODS["squares", False]
+TOGETHER = SURFACES["together"]
 
 
 @pytest.fixture(scope="module")
 def found() -> Study:
-    return study(1, lambda _: None, unseen=60)
+    return small("li-table")
 
 
-def row(table: Table, what: str) -> Row:
-    return next(row for row in table.rows if row.what == what)
-
-
-def named(found: Study, start: str) -> Table:
-    return next(table for table in found.tables if table.title.startswith(start))
+def row(of: Table, what: str) -> Row:
+    return next(row for row in of.rows if row.what == what)
 
 
 def test_the_board_has_a_circle_and_a_straight_path() -> None:
@@ -73,44 +68,40 @@ def test_a_robot_that_knows_itself_follows() -> None:
 
 
 def test_gains_are_those_of_the_mean_errors() -> None:
-    before = Followed(points=np.array([1.0, 3.0]), path=np.array([2.0, 8.0]))
-    after = Followed(points=np.array([0.5, 0.5]), path=np.array([0.0, 6.0]))
-    following = Following(before, {"roll": after})
-    assert following.gain_at_points("roll") == pytest.approx(75.0)
-    assert following.gain_on_path("roll") == pytest.approx(40.0)
+    assert gain(np.array([1.0, 3.0]), np.array([0.5, 0.5])) == pytest.approx(75.0)
 
 
 def test_with_play(found: Study) -> None:
-    points, path, ways = found.tables[0], found.tables[1], named(found, "With play")
+    points, path, ways = found.tables[0], found.tables[1], table(found, "With play")
     assert row(points, "before").verdict == "same order"
     assert row(points, "after, normal table").verdict == "by construction"
     assert all(row.published is None for row in path.rows if row.what.startswith("mean"))
     for tilt in ("normal", "roll", "pitch", TOGETHER):
-        assert row(ways, f"{tilt}: {THEIRS}").median < row(ways, "before").median
-        assert row(ways, f"{tilt}: {THEIRS}").highest < row(ways, f"{tilt}: {UNBOUNDED}").lowest
+        assert row(ways, f"{tilt}: {BOUNDED}").median < row(ways, "before").median
+        assert row(ways, f"{tilt}: {BOUNDED}").highest < row(ways, f"{tilt}: {UNBOUNDED}").lowest
 
 
 def test_without_play(found: Study) -> None:
-    ways = named(found, "Without play")
-    bounded, unbounded = row(ways, f"normal: {THEIRS}"), row(ways, f"normal: {UNBOUNDED}")
+    ways = table(found, "Without play")
+    bounded, unbounded = row(ways, f"normal: {BOUNDED}"), row(ways, f"normal: {UNBOUNDED}")
     assert all(2 * a < b for a, b in zip(bounded.values, unbounded.values, strict=True))
-    assert all(row(ways, f"{TOGETHER}: {method}").highest < 0.3 for method in METHOD_WORDS.values())
+    assert all(row(ways, f"{TOGETHER}: {method}").highest < 0.3 for method in METHODS.values())
 
 
 def test_geometry_beyond_the_bounds_is_still_mostly_taken_away(found: Study) -> None:
-    table = named(found, "Geometry alone")
-    assert [r.verdict for r in table.rows] == ["by construction", "same order", "differs", "differs", "differs"]
-    assert max(r.highest for r in table.rows[2:]) < 8.0
+    geometry = table(found, "Geometry alone")
+    assert [r.verdict for r in geometry.rows] == ["by construction", "same order", "differs", "differs", "differs"]
+    assert max(r.highest for r in geometry.rows[2:]) < 8.0
 
 
 def test_each_reading_of_the_objective_is_best_by_itself(found: Study) -> None:
-    distances, distances_other, components_other, components = (r.values for r in named(found, "Two readings").rows)
+    distances, distances_other, components_other, components = (r.values for r in table(found, "Two readings").rows)
     assert all(a < b for a, b in zip(distances, distances_other, strict=True))
     assert all(a < b for a, b in zip(components, components_other, strict=True))
 
 
 def test_the_table_alone(found: Study) -> None:
-    rows = named(found, "The table alone").rows
+    rows = table(found, "The table alone").rows
     before, after = rows[0::6], rows[3::6]
     for old, new in zip(before, after, strict=True):
         assert "other points of the table" in old.what
@@ -118,7 +109,7 @@ def test_the_table_alone(found: Study) -> None:
 
 
 def test_absolute_values_do_not_notice_mistakes(found: Study) -> None:
-    distances, components, squares, unbounded = (r.median for r in named(found, "Three holes").rows)
+    distances, components, squares, unbounded = (r.median for r in table(found, "Three holes").rows)
     assert max(distances, components) < 0.4 < 0.8 < min(squares, unbounded)
 
 
@@ -126,7 +117,7 @@ def test_the_documents_fit_is_one_command(found: Study, tmp_path: Path) -> None:
     """On the study's readings it leaves what the study's own code leaves."""
     for name, text in found.files.items():
         (tmp_path / name).write_text(text)
-    ways = named(found, "Without play")
+    ways = table(found, "Without play")
     for surface in ("normal", "roll", "pitch"):
         calibrated = calibrate(
             tmp_path / "robot.yaml",
@@ -140,5 +131,5 @@ def test_the_documents_fit_is_one_command(found: Study, tmp_path: Path) -> None:
         )
         left = validate(calibrated.robot, tmp_path / "unseen.csv").errors.position
         assert left is not None
-        assert 1e3 * left.mean == pytest.approx(row(ways, f"{surface}: {THEIRS}").values[0], rel=1e-3)
+        assert 1e3 * left.mean == pytest.approx(row(ways, f"{surface}: {BOUNDED}").values[0], rel=1e-3)
         assert "hold-contradicts" not in {notice.code for notice in calibrated.warnings}

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.papers.small import medians, small, table
 
-from papers.lrmate_hexapod import study
 from papers.lrmate_hexapod.identification import (
     NAMES,
     Cups,
@@ -17,7 +17,7 @@ from papers.lrmate_hexapod.identification import (
 )
 from papers.lrmate_hexapod.judgement import allowed_configurations, held_out, judged
 from papers.lrmate_hexapod.robot import FIXTURE, REFERENCE, invented_twin, nominal_robot, touches
-from papers.study import Study, Table
+from papers.study import Study
 from truearm.engine.data.hexapod import triangle
 from truearm.engine.robot.transform import Transform
 from truearm.engine.twin.twin import Twin, measure
@@ -26,43 +26,35 @@ from truearm.engine.twin.twin_joint import JointTruth
 
 @pytest.fixture(scope="module")
 def found() -> Study:
-    return study(1, lambda _: None, configurations=300, others=120)
-
-
-def table(found: Study, words: str) -> Table:
-    return next(table for table in found.tables if words in table.title)
-
-
-def ours(found: Study, words: str) -> dict[str, float]:
-    return {row.what: row.median for row in table(found, words).rows}
+    return small("lrmate-hexapod")
 
 
 def test_two_steps_measure_what_the_document_measured(found: Study) -> None:
     steps = table(found, "two steps")
     found_as_printed = {"agrees", "same order", "by construction", "undecided"}  # one seed tells no scatter
     assert {row.verdict for row in steps.rows if row.published is not None} <= found_as_printed
-    counts = ours(found, "two steps")
+    counts = medians(found, "two steps")
     measured = sum(count for what, count in counts.items() if " step: " in what) + counts["never in range"]
     assert measured == counts["of these measured or tried"] == 61
 
 
 def test_a_base_that_is_held_costs_most_and_one_that_follows_little(found: Study) -> None:
-    errors = ours(found, "Table 4.3")
+    errors = medians(found, "Table 4.3")
     held = {step: errors[f"{step}, base held: mean"] for step in ("preliminary", "final")}
     assert errors["nominal, base known: mean"] > held["final"] > held["preliminary"]
     assert errors["final, base following: mean"] < held["final"] / 2
     assert errors["final, base following: mean"] < errors["preliminary, base following: mean"]
     assert errors["final, base and cups found: mean"] < errors["final, base following: mean"]
     again = "final, base held, ten more rounds of touching and identifying, mean error"
-    assert ours(found, "World frame")[again] > 1.0
+    assert medians(found, "World frame")[again] > 1.0
 
 
 def test_a_tracker_is_better_away_from_the_fixture(found: Study) -> None:
-    near = ours(found, "Near the fixture")
+    near = medians(found, "Near the fixture")
     tracker = near["tracker, 50 positions: mean beyond 400 mm"]
     assert tracker < near["final, base and cups found: mean beyond 400 mm"]
     assert tracker < near["final, base held: mean beyond 400 mm"] / 3
-    assert ours(found, "Other robots")["final, base and cups found, over tracker, beyond 400 mm"] > 1.0
+    assert medians(found, "Other robots")["final, base and cups found, over tracker, beyond 400 mm"] > 1.0
     rows = {row.what: row for row in table(found, "Table 4.3").rows}
     assert rows["tracker, 50 positions: mean"].verdict == "same order"
 

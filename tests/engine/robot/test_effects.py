@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import brentq
+from tests.engine.robot.refusing import refused
 
 import truearm
-from truearm.engine.base.errors import InputError
 from truearm.engine.robot.balancers import Anchor, Balancer
 from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
 from truearm.engine.robot.effects.backlash import SEATED
 from truearm.engine.robot.effects.effect import Effect
 from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.loads import joint_loads
 from truearm.engine.robot.parts import LinkMass, Payload
 from truearm.engine.robot.postures import Postures, approach_of
 from truearm.engine.robot.robot import Robot
@@ -90,46 +92,38 @@ def test_derivatives_are_central_differences_under_load(effect: type[Effect]) ->
     robot = loaded_arm((effect.name,), 3)
     at = robot.loaded(circumstances(robot, 40, 4))
     names = [p.name for e in robot.effects for p in e.parameters]
-    linear, angular = robot.jacobians(robot.forward_kinematics(at, "tip"), at, names)
+    here = robot.forward_kinematics(at, "tip")
+    linear, angular = robot.jacobians(here, at, names)
     for i, name in enumerate(names):
         h = 1e-3 * robot.parameters[name].prior
-        ahead, behind = (
-            robot.forward_kinematics(at, "tip", {**robot.values, name: robot.values[name] + s * h}) for s in (1, -1)
-        )
-        expected = (ahead.position - behind.position) / (2 * h)
-        scale = np.abs(linear[i]).max()
-        assert_allclose(linear[i], expected, rtol=0, atol=1e-6 * scale + 1e-13 / h, err_msg=name)
-        turned = (
-            (ahead.matrix() - behind.matrix())
-            @ np.swapaxes(robot.forward_kinematics(at, "tip").matrix(), 1, 2)
-            / (2 * h)
-        )
+        values = ({**robot.values, name: robot.values[name] + step} for step in (h, -h))
+        ahead, behind = (robot.forward_kinematics(at, "tip", trial) for trial in values)
+        turned = (ahead.matrix() - behind.matrix()) @ np.swapaxes(here.matrix(), 1, 2)
         vee = np.stack([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]])
-        assert_allclose(angular[i], vee, rtol=0, atol=1e-6 * np.abs(angular[i]).max() + 1e-13 / h, err_msg=name)
+        for own, moved in ((linear[i], ahead.position - behind.position), (angular[i], vee)):
+            atol = 1e-6 * np.abs(own).max() + 1e-13 / h
+            assert_allclose(own, moved / (2 * h), rtol=0, atol=atol, err_msg=name)
     assert np.abs(linear).max() > 0
 
 
 @pytest.mark.parametrize("effects", [(effect.name,) for effect in EFFECTS] + [NAMES])
 def test_effects_that_are_off_change_nothing_at_all(effects: tuple[str, ...]) -> None:
-    plain = replace(load_robot("irb120"), payload=Payload(2.0, (0.05, 0.03, 0.1)))
+    plain = replace(load_robot("irb120"), payload=Payload(2.0, (0.05, 0.03, 0.1)), balancers=(SPRING,))
     robot = plain.with_effects(effects)
+    assert set(robot.parameters) > set(plain.parameters)
     at = circumstances(robot, 20, 5)
     for actual, expected in zip(robot.world_poses(at), plain.world_poses(at), strict=True):
         assert_array_equal(actual, expected)
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
-@pytest.mark.parametrize("massless", [True, False])
-def test_nothing_is_nan_where_a_moment_is_zero(effect: type[Effect], massless: bool) -> None:
-    robot = loaded_arm((effect.name,), 6)
-    if massless:
-        robot = replace(robot, masses=(), payload=Payload())
+def test_nothing_is_nan_where_a_moment_is_zero(effect: type[Effect]) -> None:
+    laden = loaded_arm((effect.name,), 6)
     straight_up = np.zeros((1, 6))  # no moment about joint 1, nearly none about the others
-    kinematics = robot.forward_kinematics(straight_up, "tip")
-    linear, angular = robot.jacobians(kinematics, straight_up, list(robot.parameters))
-    assert np.isfinite(kinematics.position).all()
-    assert np.isfinite(linear).all()
-    assert np.isfinite(angular).all()
+    for robot in (laden, replace(laden, masses=(), payload=Payload())):
+        kinematics = robot.forward_kinematics(straight_up, "tip")
+        for found in (kinematics.position, *robot.jacobians(kinematics, straight_up, list(robot.parameters))):
+            assert np.isfinite(found).all()
 
 
 def test_a_horizontal_arm_sags() -> None:
@@ -175,21 +169,76 @@ def test_what_is_not_known_does_nothing(effect: str) -> None:
         assert_array_equal(actual, expected)
 
 
+# -- where loads and deflections depend on each other
+
+
+@pytest.mark.parametrize("effects", [*((effect.name,) for effect in EFFECTS), NAMES], ids="+".join)
+def test_readings_are_those_that_the_variables_came_from(effects: tuple[str, ...]) -> None:
+    for name in ("irb120", "katana450"):
+        rng = np.random.default_rng(1)
+        plain = replace(load_robot(name), payload=Payload(2.0, (0.05, 0.03, 0.1))).with_effects(effects)
+        own = [p for effect in plain.effects for p in effect.parameters]
+        robot = plain.with_values({p.name: p.nominal + 0.3 * p.prior * rng.standard_normal() for p in own})
+        q = robot.random_configurations(200, rng)
+        variables = robot.variables(q, robot.values)
+        assert len(variables) == len(robot.moving)
+        assert_allclose(robot.joints_of(variables), q, rtol=0, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_equilibrium_in_the_play_of_a_joint_is_a_root_of_its_equation(up: float) -> None:
+    """An arm whose second joint has play carries a weight that balances at `up` = 1, and hangs at -1.
+
+    The moment of the weight is m g l sin(v), about an axis that no other deflection moves.
+    """
+    plain = replace(load_robot("irb120"), masses=(LinkMass(2, 4.0, (0.3 * up, 0.0, 0.0)),)).with_effects(["backlash"])
+    stiffness = up * 4.0 * 0.3 * -plain.gravity[2]
+    q = np.linspace(-0.02, 0.02, 41)[:, None] * np.eye(6)[1]
+    for play in (1e-3, 8e-3, 2e-2):
+        robot = plain.with_values({"backlash_2": play})
+
+        def sideways(v: float, reading: float, play: float = play) -> float:
+            return float(v - reading - 0.5 * play * np.tanh(stiffness * np.sin(v) / SEATED))
+
+        variables = robot.variables(q, robot.values)
+        loads = joint_loads(robot, variables)
+        assert (np.abs(loads[1, 5]) < SEATED).any()
+        assert_allclose(loads[1, 5], stiffness * np.sin(variables[1]), rtol=0, atol=1e-12)
+        if up < 0.0:
+            roots = [brentq(sideways, -0.1, 0.1, args=(reading,), xtol=1e-15) for reading in q[:, 1]]
+            assert_allclose(variables[1], roots, rtol=0, atol=5e-12)
+        else:  # above its axis a weight may balance on either side of the play: any root will do
+            left = [sideways(*pair) for pair in zip(variables[1], q[:, 1], strict=True)]
+            assert_allclose(left, 0.0, rtol=0, atol=5e-12)
+        assert_allclose(robot.joints_of(variables), q, rtol=0, atol=5e-12)
+
+
+def test_tilts_under_their_own_loads_are_those_of_the_variables() -> None:
+    robot = loaded_arm(("compliance", "bearing-compliance", "clearance"), 3)
+    variables = robot.variables(robot.random_configurations(100, np.random.default_rng(4)), robot.values)
+    assert np.abs(variables[6:18]).max() > 1e-5
+    assert_allclose(robot.tilted(variables), variables, rtol=0, atol=1e-11)
+
+
+def test_variables_of_another_number_are_refused() -> None:
+    robot = load_robot("irb120").with_effects(["bearing-compliance"])
+    for variables in (np.zeros((6, 5)), np.zeros(23)):
+        with refused("wrong number of variables", "allowed: (23, n)"):
+            robot.joints_of(variables)
+
+
 # -- what an effect says about itself
 
 
+def test_names_are_unlike() -> None:
+    assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)
+
+
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
-def test_the_group_of_its_parameters_is_its_name(effect: type[Effect]) -> None:
+def test_it_depends_on_moves_and_is_called_what_it_says(effect: type[Effect]) -> None:
     robot = loaded_arm((effect.name,), 3)
     own = next(each for each in robot.effects if each.name == effect.name)
-    assert own.parameters
     assert {p.group for p in own.parameters if p.group != "session"} == {effect.name}
-    assert len({e.name for e in EFFECTS}) == len(EFFECTS)
-
-
-@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
-def test_it_depends_on_what_it_says(effect: type[Effect]) -> None:
-    robot = loaded_arm((effect.name,), 3)
     at = circumstances(robot, 40, 4)
     assert at.wrench is not None
     assert at.approach is not None
@@ -204,12 +253,8 @@ def test_it_depends_on_what_it_says(effect: type[Effect]) -> None:
     assert matters(approach=-at.approach, number=at.number[::-1]) == effect.ordered
     assert matters(temperature=at.temperature + 5.0) == effect.warmed
 
-
-@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
-def test_it_moves_what_it_says(effect: type[Effect]) -> None:
-    robot = loaded_arm((effect.name,), 3)
-    at = robot.loaded(circumstances(robot, 20, 4))
-    moved = {variable for rate in robot.effects[0].derivative(at, robot.values).values() for variable in rate}
+    rates = robot.effects[0].derivative(robot.loaded(at), robot.values).values()
+    moved = {variable for rate in rates for variable in rate}
     layout = robot.layout
     tilts = {variable for joint in layout.joints for variable in layout.tilt(joint)}
     lengths = {layout.length(number) for number in range(len(layout.lengths))}
@@ -221,16 +266,16 @@ def test_it_moves_what_it_says(effect: type[Effect]) -> None:
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_only_what_can_be_negative_may_be_stated_so(effect: type[Effect], tmp_path: Path) -> None:
     robot = replace(loaded_arm((effect.name,), 3), history=())
-    name = robot.effects[0].parameters[0].name
-    (tmp_path / "robot.yaml").write_text(robot_text(robot.with_values({name: -1e-5})))
+    own = robot.effects[0].parameters[0]
     assert (effect.name in NON_NEGATIVE) == effect.non_negative
-    if effect.non_negative:
-        with pytest.raises(
-            InputError, match=rf"{name}\.value: no joint has a negative one; got '-.*; allowed: 0 or more"
-        ):
-            read_robot(tmp_path / "robot.yaml")
-    else:
-        assert read_robot(tmp_path / "robot.yaml").values[name] == pytest.approx(-1e-5)
+    for field in ("nominal", "value"):
+        negative = replace(robot.parameters[own.name], **{field: -1e-5})  # type: ignore[arg-type]
+        (tmp_path / "robot.yaml").write_text(robot_text(robot.with_parameters([negative])))
+        if effect.non_negative:
+            with refused(f"{own.name}.{field}: no joint has a negative one", "allowed: 0 or more"):
+                read_robot(tmp_path / "robot.yaml")
+        else:
+            assert getattr(read_robot(tmp_path / "robot.yaml").parameters[own.name], field) == pytest.approx(-1e-5)
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
@@ -284,6 +329,7 @@ def spelled_lists(source: str, names: frozenset[str]) -> Iterator[int]:
 
 def test_no_other_module_lists_effects() -> None:
     names = frozenset(effect.name for effect in EFFECTS)
+    assert list(spelled_lists('x = ("gain", 1)\ny = {"gain": "backlash"}\nz = ["other"]\n', names)) == [1, 2]
     package = Path(truearm.__file__).parent
     found = [
         f"{'.'.join(path.relative_to(package.parent).with_suffix('').parts)}.{line}"
@@ -294,8 +340,3 @@ def test_no_other_module_lists_effects() -> None:
     assert [place for place in found if not place.startswith(tuple(f"{name}." for name in NAMED_ELSEWHERE))] == []
     for allowed in NAMED_ELSEWHERE:
         assert any(place.startswith(f"{allowed}.") for place in found), f"{allowed} needs no exception any more"
-
-
-def test_the_scan_finds_a_list() -> None:
-    names = frozenset(effect.name for effect in EFFECTS)
-    assert list(spelled_lists('x = ("gain", 1)\ny = {"gain": "backlash"}\nz = ["other"]\n', names)) == [1, 2]

@@ -159,8 +159,8 @@ def test_the_order_of_readings_does_not_matter() -> None:
     q = twin.robot.random_configurations(20, np.random.default_rng(2))
     one, other = (identify(load_robot("ur5"), d, GEOMETRIC).robot for d in (data, shuffled))
     for target in one.targets:
-        places = (robot.world_poses(q, target.name)[0] for robot in (one, other))
-        np.testing.assert_allclose(*places, atol=1e-10, rtol=0)
+        before, after = (robot.world_poses(q, target.name)[0] for robot in (one, other))
+        np.testing.assert_allclose(before, after, atol=1e-10, rtol=0)
 
 
 @settings(max_examples=10, deadline=None)

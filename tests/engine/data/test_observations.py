@@ -183,13 +183,8 @@ def with_setup(robot: Robot, data: Dataset) -> Dataset:
 
 
 def test_many_trials_at_once_are_each_alone() -> None:
-    for effects, chosen in (
-        ("effects", ""),
-        ("rigid", ""),
-        ("rigid", "base"),
-        ("rigid", "target"),
-        ("rigid", "fixture"),
-    ):
+    kinds = ("", "base", "target", "fixture")
+    for effects, chosen in (("effects", ""), *(("rigid", kind) for kind in kinds)):
         robot = robot_with(effects)
         data = with_setup(robot, readings_of(robot, COMBINATIONS))
         free = FreeParameters(tuple(p for p in robot.parameters.values() if chosen in ("", p.group)))

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.engine.robot.refusing import refused
 
-from truearm.engine.base.errors import InputError
 from truearm.engine.fit.fit import identify, place
 from truearm.engine.fit.models import MODELS
 from truearm.engine.robot.chain import Array
@@ -121,37 +121,32 @@ def test_an_arm_identified_on_an_exact_table_predicts_other_points_of_it() -> No
     assert np.abs(fitted.world_poses(unseen.joints, "tip")[0] - unseen.position).max() < 1e-7
 
 
-def test_a_point_out_of_reach_is_named() -> None:
-    points = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
-    with pytest.raises(InputError, match=r"point 2: the tip does not come to rest.*mm away"):
-        CalibrationTable(points, PLACE).touched_by(Twin(arm()), ELBOW_UP, 0.0, np.random.default_rng(0))
-
-
-def test_a_joint_beyond_its_limits_is_named() -> None:
-    with pytest.raises(InputError, match=r"point 1: a joint would leave its limits.*joint_1 at.*-120 to 120 deg"):
-        CalibrationTable(np.array([[-0.55, -0.12, 0.1]]), PLACE).touched_by(
-            Twin(arm()), np.radians((-150.0, 60.0, -90.0)), 0.0, np.random.default_rng(0)
-        )
+def test_points_out_of_reach_or_beyond_limits_are_named() -> None:
+    points, rng = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]), np.random.default_rng(0)
+    with refused("point 2: the tip does not come to rest", "mm away"):
+        CalibrationTable(points, PLACE).touched_by(Twin(arm()), ELBOW_UP, 0.0, rng)
+    behind = CalibrationTable(np.array([[-0.55, -0.12, 0.1]]), PLACE)
+    with refused("point 1: a joint would leave its limits", "joint_1 at", "-120 to 120 deg"):
+        behind.touched_by(Twin(arm()), np.radians((-150.0, 60.0, -90.0)), 0.0, rng)
 
 
 def test_a_roll_beyond_the_ball_joint_is_refused_and_a_pitch_is_not() -> None:
     table = CalibrationTable(GRID, PLACE)
-    with pytest.raises(InputError, match=r"rolled so far.*25 deg.*-20 to 20 deg"):
-        table.tilted(math.radians(25.0), 0.0)
-    with pytest.raises(InputError, match="rolled so far"):
-        table.tilted(math.nan, 0.0)
+    for roll in (math.radians(25.0), math.nan):
+        with refused("rolled so far", "-20 to 20 deg"):
+            table.tilted(roll, 0.0)
     assert table.tilted(0.0, math.radians(60.0)).place != table.place
 
 
-@pytest.mark.parametrize("points", [np.zeros((0, 3)), np.zeros((4, 2)), np.array([[0.0, math.nan, 0.0]])])
-def test_points_that_are_none_are_refused(points: Array) -> None:
-    with pytest.raises(InputError, match="calibration table"):
-        CalibrationTable(points)
-
-
-def test_one_target_touches() -> None:
+def test_points_grids_and_targets_that_are_none_are_refused() -> None:
+    for points in (np.zeros((0, 3)), np.zeros((4, 2)), np.array([[0.0, math.nan, 0.0]])):
+        with refused("calibration table", of=points):
+            CalibrationTable(points)
+    for columns, rows, spacing in ((0, 3, 0.01), (3, 0, 0.01), (3, 3, 0.0), (3, 3, math.nan)):
+        with refused("a grid needs columns, rows and space", of=(columns, rows, spacing)):
+            rectangular_grid(columns, rows, spacing)
     twin = Twin(arm().with_frames(IDENTITY, {"1": (0.0, 0.0, 0.0), "2": (0.0, 0.0, 0.1)}))
-    with pytest.raises(InputError, match=r"one target touches the table.*2 targets"):
+    with refused("one target touches the table", "2 targets"):
         CalibrationTable(GRID, PLACE).touched_by(twin, ELBOW_UP, 0.0, np.random.default_rng(0))
 
 
@@ -160,9 +155,3 @@ def test_a_grid_lies_about_its_middle() -> None:
     np.testing.assert_allclose(grid[:, 0] * 1e3, [-10, 0, 10, -10, 0, 10], atol=1e-12)
     np.testing.assert_allclose(grid[:, 1] * 1e3, [-5, -5, -5, 5, 5, 5], atol=1e-12)
     assert not grid[:, 2].any()
-
-
-@pytest.mark.parametrize(("columns", "rows", "spacing"), [(0, 3, 0.01), (3, 0, 0.01), (3, 3, 0.0), (3, 3, math.nan)])
-def test_a_grid_without_points_is_refused(columns: int, rows: int, spacing: float) -> None:
-    with pytest.raises(InputError, match="a grid needs columns, rows and space"):
-        rectangular_grid(columns, rows, spacing)

@@ -107,15 +107,6 @@ def test_of_an_order_knows_the_last_moves() -> None:
     assert_array_equal(Dataset.of(q, positions(), order=np.array(order) - 1).number, data.number)
 
 
-def test_arrays_can_be_calibrated() -> None:
-    true = off_nominal()
-    q = true.random_configurations(40, np.random.default_rng(0))
-    position, _ = true.forward(q, frame="world", target="1")
-    found = calibrate("irb120", Dataset.of(q, position, sigma=1e-5), train="all")
-    predicted, _ = found.robot.forward(q, frame="world", target="1")
-    assert np.abs(predicted - position).max() < 2e-5
-
-
 def test_arrays_that_do_not_fit_are_refused() -> None:
     wrong: dict[str, list[Any]] = {
         "joints": [np.full((N, 6), NAN), np.zeros(6), np.zeros((0, 6)), "q", 1e7 * np.ones((N, 6))],

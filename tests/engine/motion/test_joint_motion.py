@@ -136,15 +136,6 @@ def test_a_redundant_arm_stays_as_near_to_its_start_as_it_can() -> None:
     assert np.abs(motion.joints[far] - motion.joints[0]).max() > 0.1
 
 
-def test_the_katana_follows_the_circle_of_the_thesis() -> None:
-    points = np.array([[100, -300, 139.2893], [0, -370.7107, 210], [-100, -300, 139.2893]]) * 1e-3
-    path = timed(Circle.through(*points), speed=0.1, acceleration=0.4, step=0.02)
-    motion = joint_motion(katana(), path, target="tip")
-    assert np.abs(Tip(katana(), "tip").positions(motion.joints) - path.position).max() < 1e-12
-    assert motion.singular_value.min() > 0.1
-    assert np.abs(motion.velocity[[0, -1]]).max() < 1e-12
-
-
 def test_joint_effects_are_not_planned_for() -> None:
     robot = load_robot("li3")
     path = line((0.3, 0.0, 0.3), (0.3, 0.1, 0.3))

@@ -179,15 +179,6 @@ def test_derivatives_of_effect_are_central_differences(effect: type[Effect]) -> 
         check_derivatives(random_robot(convention, (effect.name,), rng), rng)
 
 
-def test_derivative_by_the_parameters_of_another_target_is_zero() -> None:
-    rng = np.random.default_rng(3)
-    robot = random_robot(CONVENTIONS[0], (), rng)
-    q = robot.random_configurations(2, rng)
-    linear, angular = robot.jacobians(robot.forward_kinematics(q, "tip"), q, ["target_point_x"])
-    assert not linear.any()
-    assert not angular.any()
-
-
 # -- trial axis ------------------------------------------------------------------------------------------
 
 
@@ -234,20 +225,6 @@ def test_trials_of_one_parameter_equal_trials_alone() -> None:
 def test_parameter_given_twice_is_refused() -> None:
     with pytest.raises(ValueError, match="'a' occurs twice"):
         Chain((Element("Tx", parameter="a"), Element("Ty", parameter="a")))
-
-
-def test_sweep_goes_on_from_another() -> None:
-    rng = np.random.default_rng(6)
-    chain, values, count = random_chain(rng)
-    variables = rng.uniform(-1, 1, (count, CONFIGURATIONS))
-    whole = chain.forward_kinematics(variables, values)
-    front, back = Chain(chain.elements[:2]), Chain(chain.elements[2:])
-    pieces = back.forward_kinematics(variables, values, front.forward_kinematics(variables, values))
-    assert_allclose(pieces.position, whole.position, rtol=0, atol=0)
-    assert_allclose(pieces.matrix(), whole.matrix(), rtol=0, atol=0)
-    indices = range(len(chain.elements))
-    for actual, expected in zip(pieces.jacobians(indices), whole.jacobians(indices), strict=True):
-        assert_allclose(actual, expected, rtol=0, atol=0)
 
 
 @pytest.mark.parametrize("trials", [0, 3])

@@ -243,13 +243,6 @@ def test_conversion_leaves_the_controllers_poses() -> None:
             assert replace(made.controller, base=turned) == controller
 
 
-def test_a_conversion_that_moves_the_base_says_where_the_controllers_was() -> None:
-    made = converted(load_robot("kr5"), "standard-dh")
-    assert made.controller.base != Transform()
-    poses = controller_poses(made, np.zeros((1, 6)))
-    assert_allclose(poses[0, :3, 3], [1.515, 0.0, 0.520], rtol=0, atol=1e-12)
-
-
 # -- the library -------------------------------------------------------------------------------------------
 
 

@@ -12,7 +12,6 @@ from tests.engine.robot.test_chain import random_frame, random_robot
 from truearm.engine.robot.chain import Array, Chain
 from truearm.engine.robot.conventions import CONVENTIONS
 from truearm.engine.robot.conventions.convention import Convention
-from truearm.engine.robot.conventions.cpc import published_direction
 from truearm.engine.robot.conversion import CONVERSIONS, converted
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.loads import joint_loads
@@ -185,13 +184,6 @@ def test_rows_survive_their_own_convention() -> None:
         for one, other in zip(once.joints, converted(once, name).joints, strict=True):
             assert list(one.row) == list(other.row)
             assert_allclose(list(other.row.values()), list(one.row.values()), rtol=0, atol=1e-14, err_msg=name)
-
-
-def test_published_direction_of_a_calibrated_cpc_robot() -> None:
-    robot = converted(load_robot("irb120"), "cpc").with_values({"rx_2": 1e-3, "ry_2": -2e-3})
-    row = converted(robot, "cpc").joints[1].row
-    b = published_direction((0.0, 0.0, 1.0), 1e-3, -2e-3)
-    assert_allclose([row["b_x"], row["b_y"], row["b_z"]], b, rtol=0, atol=1e-15)
 
 
 def test_axes_close_to_parallel_get_a_beta_and_others_a_common_normal() -> None:

@@ -11,7 +11,6 @@ import pytest
 from scipy.optimize import least_squares
 from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_effects import NAMES, loaded_arm
-from tests.pinocchio_oracle import PinocchioChain
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.branches import BRANCHES, BranchRule, branch_rule
@@ -21,8 +20,6 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Joint, LinkMass, Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, rotation_vector
-from truearm.engine.twin.truths import joint_truths
-from truearm.engine.twin.twin import Twin
 
 SIX = ["irb120", "irb1600", "lrmate200ic", "kr5", "puma560", "ur5", "ur10"]
 
@@ -133,16 +130,6 @@ def test_every_nominal_branch_is_found_again_where_it_exists(name: str) -> None:
     assert not any(same)
 
 
-def test_an_oracle_agrees_that_the_joints_give_the_pose() -> None:
-    robot = calibrated(load_robot("kr5"), 4)
-    p, R = robot.world_poses(robot.random_configurations(5, np.random.default_rng(0)))
-    oracle = PinocchioChain(robot.trunk, robot.values)
-    for row, joints in enumerate((found := inverse(robot, p, R, frame="world")).joints):
-        position, rotation, _ = oracle.tip(joints)
-        assert np.abs(position - p[found.pose[row]]).max() < 1e-9
-        assert np.abs(rotation - R[found.pose[row]]).max() < 1e-9
-
-
 def test_words_of_the_branches() -> None:
     q = np.radians(
         [
@@ -224,30 +211,6 @@ def test_the_seed_gives_the_same_joints_back(effects: tuple[str, ...]) -> None:
     regular = found.singular_value > 0.05
     assert regular.sum() > 90
     assert np.abs(found.joints - q)[regular].max() < 1e-9
-
-
-def test_readings_under_load_bring_the_twin_to_the_pose() -> None:
-    robot = loaded_arm(("compliance", "hardening", "fourier", "gain", "bearing-compliance", "clearance"), 3)
-    p, R = robot.rigid.world_poses(robot.random_configurations(8, np.random.default_rng(4)), "tip")
-    found = inverse(robot, p, R, frame="world", target="tip")
-    rows = found.rows(PoseStatus.REACHED, PoseStatus.NEAR_SINGULAR)
-    assert len(rows) >= 6
-    postures = Twin(robot, joint_truths(robot)).postures(found.joints[rows])
-    for row, posture in zip(rows, postures, strict=True):
-        assert np.abs(posture.targets["tip"][:3, 3] - p[found.pose[row]]).max() < 1e-9
-        assert np.abs(posture.targets["tip"][:3, :3] - R[found.pose[row]]).max() < 1e-9
-
-
-def test_the_pose_with_another_payload_takes_other_readings() -> None:
-    arm = loaded_arm(TILTING, 3)
-    p, R = arm.world_poses(arm.random_configurations(20, np.random.default_rng(4)))
-    light, heavy = (
-        inverse(arm.with_payload(Payload(mass, (0.0, 0.02, 0.1))), p, R, frame="world") for mass in (0.3, 5.0)
-    )
-    assert light.complete
-    assert heavy.complete
-    same = [one == other for one, other in zip(light.branch, heavy.branch, strict=True)]
-    assert np.abs(light.joints - heavy.joints)[same].max(axis=1).min() > 1e-6
 
 
 @pytest.mark.parametrize(

@@ -191,26 +191,6 @@ def test_turning_mass_pulls_outwards_and_resists() -> None:
     assert_allclose(loads[0, :, 0], [2 * 16 * 0.8, -2 * 0.8 * 5, 0, 0, 0, -2 * 0.64 * 5], rtol=0, atol=1e-13)
 
 
-def test_slide_carries_the_weight_along_it() -> None:
-    rows = {"type": "prismatic", "theta_offset": 0.0, "d": 0.0, "alpha": 0.0, "a": 0.0}
-    row = {k: v for k, v in rows.items() if isinstance(v, float)}
-    slide = lever(joints=(Joint("lift", "prismatic", row),), payload=Payload(3.0, (0.1, 0.0, 0.0)))
-    loads = joint_loads(slide, np.array([[0.5]]), acceleration=np.array([[2.0]]))
-    weight = 3.0 * (9.80665 + 2.0)
-    assert_allclose(loads[0, :, 0], [0, 0, -weight, 0, 0.9 * weight, 0], rtol=1e-15, atol=1e-14)
-
-
-def test_horizontal_pull_turns_an_upright_axis() -> None:
-    robot = load_robot("irb120")
-    robot = replace(robot, masses=())
-    q = robot.random_configurations(CONFIGURATIONS, np.random.default_rng(2)).T
-    wrench = np.zeros((6, CONFIGURATIONS))
-    wrench[1] = 30.0
-    loads = joint_loads(robot, q, wrench=wrench)
-    reach = robot.world_poses(q.T)[0][:, 0]
-    assert_allclose(loads[0, 5], 30.0 * reach, rtol=0, atol=1e-12)
-
-
 # -- what must hold for every arm ------------------------------------------------------------------------
 
 
@@ -232,32 +212,6 @@ def height_of_weight(robot: Robot, bodies: Array, elements: tuple[tuple[Element,
             link.mass * np.array(robot.gravity) @ Chain(tuple(way)).forward_kinematics(bodies, robot.values).position
         )
     return energy
-
-
-@pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)
-def test_arm_that_yields_to_its_load_sags(convention: Convention) -> None:
-    rng = np.random.default_rng(3)
-    robot = replace(heavy_robot(convention, rng), payload=Payload())
-    variables = motion(robot, rng)[0]
-    loads = joint_loads(robot, variables)
-    joints = [next(e for e in link if e.variable is not None) for link in robot.link_elements]
-    for i, joint in enumerate(joints):
-        # tilts and shifts of this joint alone, behind its element, in its own axes
-        for k, axis in enumerate((*across(joint), axis_of(joint))):
-            for motion_, load in (("T", loads[i, k]), ("R", loads[i, 3 + k])):
-                if np.abs(load).max() < 1e-9:
-                    continue
-                yielding = Element(motion_, variable=len(joints), axis=axis)  # type: ignore[arg-type]
-                bent = list(robot.link_elements)
-                place = bent[i].index(joint) + 1
-                every = [e for each in robot.link_elements for e in each]
-                away = bearing_of(every, every.index(joint), robot)
-                there, back_again = (Element("T", s * away, axis=axis_of(joint)) for s in (1.0, -1.0))
-                bent[i] = (*bent[i][:place], there, yielding, back_again, *bent[i][place:])
-                step = 1e-6
-                moved = height_of_weight(robot, np.vstack([variables, np.full(CONFIGURATIONS, step)]), tuple(bent))
-                back = height_of_weight(robot, np.vstack([variables, np.full(CONFIGURATIONS, -step)]), tuple(bent))
-                assert_allclose((back - moved) / (2 * step), load, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["standard-dh", "modified-hayati", "product-of-exponentials", "urdf"])

@@ -41,41 +41,29 @@ UR_LIKE = b"""<?xml version="1.0" ?>
   </joint>
   <link name="base_link"><inertial><mass value="4.0"/><origin xyz="0 0 0.1"/></inertial></link>
   <joint name="shoulder_pan_joint" type="revolute">
-    <parent link="base_link"/>
-    <child link="shoulder_link"/>
-    <origin rpy="0.0 0.0 0.0" xyz="0.0 0.0 0.089159"/>
-    <axis xyz="0 0 1"/>
-    <limit effort="150.0" lower="-6.2832" upper="6.2832" velocity="3.15"/>
+    <parent link="base_link"/><child link="shoulder_link"/><origin rpy="0.0 0.0 0.0" xyz="0.0 0.0 0.089159"/>
+    <axis xyz="0 0 1"/><limit effort="150.0" lower="-6.2832" upper="6.2832" velocity="3.15"/>
   </joint>
   <link name="shoulder_link">
     <visual><origin rpy="0 0 1" xyz="1 2 3"/><geometry><sphere radius="0.1"/></geometry></visual>
     <inertial>
-      <mass value="3.7"/>
-      <origin rpy="0.0 0.0 0.0" xyz="0.0 0.01 0.0"/>
+      <mass value="3.7"/><origin rpy="0.0 0.0 0.0" xyz="0.0 0.01 0.0"/>
       <inertia ixx="0.01" ixy="0.0" ixz="0.0" iyy="0.01" iyz="0.0" izz="0.01"/>
     </inertial>
   </link>
   <joint name="shoulder_lift_joint" type="revolute">
-    <parent link="shoulder_link"/>
-    <child link="upper_arm_link"/>
-    <origin rpy="0.0 1.5708 0.0" xyz="0.0 0.13585 0.0"/>
-    <axis xyz="0 1 0"/>
-    <limit effort="150.0" lower="-6.2832" upper="6.2832" velocity="3.15"/>
+    <parent link="shoulder_link"/><child link="upper_arm_link"/><origin rpy="0.0 1.5708 0.0" xyz="0.0 0.13585 0.0"/>
+    <axis xyz="0 1 0"/><limit effort="150.0" lower="-6.2832" upper="6.2832" velocity="3.15"/>
   </joint>
   <link name="upper_arm_link"/>
   <joint name="elbow_joint" type="revolute">
-    <parent link="upper_arm_link"/>
-    <child link="forearm_link"/>
-    <origin rpy="0.0 0.0 0.0" xyz="0.0 -0.1197 0.42500"/>
-    <axis xyz="0 1 0"/>
-    <limit effort="150.0" lower="-3.1416" upper="3.1416" velocity="3.15"/>
+    <parent link="upper_arm_link"/><child link="forearm_link"/><origin rpy="0.0 0.0 0.0" xyz="0.0 -0.1197 0.42500"/>
+    <axis xyz="0 1 0"/><limit effort="150.0" lower="-3.1416" upper="3.1416" velocity="3.15"/>
   </joint>
   <link name="forearm_link"/>
   <joint name="wrist_1_joint" type="continuous">
-    <parent link="forearm_link"/>
-    <child link="wrist_1_link"/>
-    <origin rpy="0.0 1.5707963267948966 0.0" xyz="0.0 0.0 0.39225"/>
-    <axis xyz="0 1 0"/>
+    <parent link="forearm_link"/><child link="wrist_1_link"/>
+    <origin rpy="0.0 1.5707963267948966 0.0" xyz="0.0 0.0 0.39225"/><axis xyz="0 1 0"/>
   </joint>
   <link name="wrist_1_link"/>
   <joint name="flange_joint" type="fixed">
@@ -83,8 +71,7 @@ UR_LIKE = b"""<?xml version="1.0" ?>
   </joint>
   <link name="flange">
     <inertial>
-      <mass value="0.3"/>
-      <inertia ixx="0.01" ixy="0.0" ixz="0.0" iyy="0.01" iyz="0.0" izz="0.01"/>
+      <mass value="0.3"/><inertia ixx="0.01" ixy="0.0" ixz="0.0" iyy="0.01" iyz="0.0" izz="0.01"/>
     </inertial>
   </link>
   <joint name="sensor_joint" type="fixed">
@@ -319,7 +306,7 @@ FIXED = joint("f", "b", "tool0", "fixed")
 REFUSED: list[tuple[bytes, tuple[str, ...]]] = [
     (b" \n", ("robot.urdf", "empty")),
     (b"truearm: truearm-robot/1\n", ("robot.urdf, line 1", "not valid XML")),
-    (UR_LIKE.replace(b"</robot>", b"</robt>"), ("line 74", "not valid XML", "mismatched tag")),
+    (UR_LIKE.replace(b"</robot>", b"</robt>"), ("line 61", "not valid XML", "mismatched tag")),
     (b"<sdf version='1.6'/>", ("not a URDF", "'<sdf>'")),
     (UR_LIKE.decode().encode("utf-16"), ("UTF-8", "Save it")),
     (b"<?xml version='1.0' encoding='klingon'?><robot/>", ("encoding", "klingon", "UTF-8")),

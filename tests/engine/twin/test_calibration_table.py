@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.engine.robot.refusing import refused
 
-from truearm.engine.fit.fit import identify, place
-from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.fit import place
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
@@ -107,18 +105,6 @@ def test_roll_and_pitch_against_the_robot_are_base_parameters() -> None:
     base = place(load_robot("li3"), data).base  # T_table_base
     np.testing.assert_allclose(base.rotation.T, table.place.rotation, atol=1e-7)
     np.testing.assert_allclose(-base.rotation.T @ np.array(base.translation), PLACE.translation, atol=1e-7)
-
-
-def test_an_arm_identified_on_an_exact_table_predicts_other_points_of_it() -> None:
-    rng = np.random.default_rng(5)
-    twin = Twin(off(arm(), rng))
-    table = CalibrationTable(rectangular_grid(7, 7, 0.03), PLACE).tilted(ROLL, PITCH)
-    other = replace(table, points=rectangular_grid(4, 4, 0.045) + np.array([0.005, -0.003, 0.0]))
-    geometric = next(model for model in MODELS if model.name == "geometric")
-    data, unseen = (t.touched_by(twin, ELBOW_UP, 0.0, rng) for t in (table, other))
-    before, fitted = (place(load_robot("li3"), data), identify(load_robot("li3"), data, geometric).robot)
-    assert np.abs(before.world_poses(unseen.joints, "tip")[0] - unseen.position).max() > 1e-5
-    assert np.abs(fitted.world_poses(unseen.joints, "tip")[0] - unseen.position).max() < 1e-7
 
 
 def test_points_out_of_reach_or_beyond_limits_are_named() -> None:

@@ -22,10 +22,11 @@ from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.parts import GRAVITY, Joint, LinkMass, Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
+from truearm.engine.twin import gear_errors, twin_joint
 from truearm.engine.twin import twin as twin_module
-from truearm.engine.twin import twin_joint
 from truearm.engine.twin.devices import named_device
 from truearm.engine.twin.devices.device import measured_with
+from truearm.engine.twin.gear_errors import DRAWN
 from truearm.engine.twin.truths import joint_truths, truth_twin
 from truearm.engine.twin.twin import Conditions, Posture, Twin, directions, measure
 from truearm.engine.twin.twin_joint import Contact, JointTruth
@@ -178,17 +179,6 @@ def test_with_nothing_true_but_the_robot_the_twin_is_the_model() -> None:
         assert np.array_equal(measure(zeros, q, 0.0, rng).position, seen.position)
 
 
-def test_a_level_arm_sags_until_moment_and_deflection_agree() -> None:
-    c, mass, length = 2e-3, 4.0, 0.6
-    twin = Twin(planar(length, payload=mass), {1: JointTruth(compliance=c)})
-    posture = at(twin, 0.0)
-    x, y = posture.targets["tip"][:2, 3]
-    turn = math.atan2(y, x)
-    assert y < 0
-    assert turn == pytest.approx(-c * mass * G * length * math.cos(turn), rel=1e-12)
-    assert turn == pytest.approx(-c * mass * G * length, rel=2e-3)
-
-
 def test_two_links_sag_in_equilibrium() -> None:
     c1, c2 = 1e-3, 3e-3
     twin = Twin(planar(0.5, 0.4, payload=3.0), {1: JointTruth(compliance=c1), 2: JointTruth(compliance=c2)})
@@ -230,12 +220,6 @@ def test_backlash_falls_to_the_side_of_the_load_and_a_reversal_shows_the_whole_g
     for side in (-1.0, 0.0, 1.0):
         wrench = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, side]])
         assert light.postures(np.array([[0.2]]), wrench=wrench)[0].deflection[0, 2] == side * gap / 2
-
-
-def test_gears_run_out_of_true_by_their_harmonics() -> None:
-    twin = Twin(planar(0.5), {1: JointTruth(gear=((1, 1e-4, 0.3), (50, 2e-5, -1.0)))})
-    turn = 1e-4 * math.sin(0.8 + 0.3) + 2e-5 * math.sin(50 * 0.8 - 1.0)
-    assert at(twin, 0.8).deflection[0, 2] == pytest.approx(turn, rel=1e-14)
 
 
 def test_the_direction_of_approach_is_that_of_the_last_move() -> None:
@@ -287,18 +271,6 @@ def test_exact_contact_has_the_whole_tilt_and_no_preferred_direction() -> None:
     contact: Contact
     for contact in ("exact", "document"):
         assert_allclose(loose.tilt(0.0, 0.0, contact), 0.0)
-
-
-def test_every_joint_of_the_katana_tilts_with_the_load() -> None:
-    """Where a joint gives way in the direction of its load, the load's work is positive: the arm's weight falls."""
-    robot = load_robot("katana450").with_frames(Transform(), {"tip": (0.0, 0.0, 0.0)})
-    q = robot.random_configurations(20, RNG(1))
-    for number in range(1, 6):
-        weightless = replace(robot, masses=(), payload=Payload(1.0))
-        loose = measure(Twin(weightless, {number: JointTruth(clearance=4e-4)}), q, 0.0, RNG(0))
-        fall = loose.position[:, 2] - measure(Twin(weightless), q, 0.0, RNG(0)).position[:, 2]
-        assert (fall < 1e-7).all()  # second order in the tilt may lift it
-        assert fall.min() < -2e-5
 
 
 # -- the Katana of the thesis ---------------------------------------------------------------------------------------
@@ -357,16 +329,6 @@ def test_a_truth_carries_the_tool_unless_the_robot_carries_something() -> None:
     loaded = replace(robot, payload=Payload(0.3))
     assert truth_twin(loaded, "tracker-triangular", RNG(0)).robot.payload == Payload(0.3)
     assert robot.gravity == GRAVITY
-
-
-def test_noise_and_sigma() -> None:
-    twin = truth_twin(load_robot("irb120"), "nominal", RNG(0))
-    q = twin.robot.random_configurations(200, RNG(1))
-    seen = measure(twin, q, 1e-4, RNG(2))
-    noise = seen.position - measure(twin, q, 0.0, RNG(2)).position
-    assert noise.std() == pytest.approx(1e-4, rel=0.05)
-    assert seen.sigma is not None
-    assert (seen.sigma == 1e-4).all()
 
 
 # -- refusals ---------------------------------------------------------------------------------------------------------
@@ -486,3 +448,85 @@ def test_more_configurations_than_are_followed_at_a_time() -> None:
     one_by_one = np.array([twin.postures(joints[[row]])[0].links for row in (0, 511, 512, 1023, 1024, 1029)])
     assert_allclose(found[[0, 511, 512, 1023, 1024, 1029]], one_by_one, rtol=1e-13, atol=1e-15)
     assert len(found) == 1030
+
+
+# -- truths whose encoders and gears err: their amplitudes are those stated, and they go a way of their own
+
+TURN = np.linspace(-math.pi, math.pi, 7200, endpoint=False)
+
+
+def curve(joint: JointTruth) -> np.ndarray:
+    """Return what a joint turns beyond its position over a turn, 20 places a degree [deg]."""
+    rest = np.zeros(len(TURN))
+    return np.degrees(joint.turn(TURN, rest, rest))
+
+
+def strengths(joint: JointTruth) -> np.ndarray:
+    """Return the amplitude [deg] of each number of periods in a turn, from 0."""
+    return 2.0 * np.abs(np.fft.rfft(curve(joint))) / len(TURN)
+
+
+def geared(truth: str, seed: int = 0, robot: str = "irb120") -> Twin:
+    return truth_twin(load_robot(robot), truth, np.random.default_rng(seed))
+
+
+def test_gears_err_as_often_and_as_much_as_stated() -> None:
+    drawn = geared("gear-errors")
+    for number in range(1, 7):
+        found = strengths(drawn.joints[number])
+        often = np.flatnonzero(found > 1e-9)
+        assert len(often) == 5
+        assert often[:2].tolist() == [1, 2]
+        assert ((often[2:] >= 10) & (often[2:] <= 60)).all()
+        assert found[often] == pytest.approx([0.010, 0.004, 0.006, 0.006, 0.006])
+        assert curve(drawn.joints[number]).std() == pytest.approx(0.0106, abs=1e-4)
+    periods = {tuple(k for k, _, _ in joint.gear) for joint in drawn.joints.values()}
+    assert len(periods) == 6  # no joint like another
+
+
+def test_teeth_and_worn_places_are_no_series_that_ends() -> None:
+    for joint in geared("tooth-errors").joints.values():
+        found = strengths(joint)
+        assert 0.009 < curve(joint).std() < 0.016
+        assert np.sqrt((found[61:] ** 2).sum() / 2) > 1e-4  # some is beyond 60 periods
+
+
+def test_a_triangle_is_straight_between_its_ends() -> None:
+    rising = JointTruth(teeth=((4, 2e-4, 0.0),))
+    assert [rising.turn(q, 0.0, 0.0) for q in (0.0, math.pi / 16, math.pi / 8, 3 * math.pi / 8)] == pytest.approx(
+        [0.0, 1e-4, 2e-4, -2e-4], abs=1e-15
+    )
+
+
+def test_a_worn_place_ends_where_it_is_said_to_and_comes_again_after_a_turn() -> None:
+    worn = JointTruth(bumps=((3.0, 0.2, 1e-4),))
+    at = {q: worn.turn(q, 0.0, 0.0) for q in (3.0, 3.1, 3.3, 2.79, 3.0 - 2 * math.pi, -math.pi + 0.01)}
+    assert at[3.0] == pytest.approx(1e-4)
+    assert at[3.1] == pytest.approx(0.5e-4)
+    assert at[3.3] == at[2.79] == 0.0
+    assert at[3.0 - 2 * math.pi] == pytest.approx(1e-4)
+    assert at[-math.pi + 0.01] == pytest.approx(0.5e-4 * (1.0 + math.cos(math.pi * (math.pi + 0.01 - 3.0) / 0.2)))
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_the_arm_itself_is_that_of_a_random_truth_and_the_seed_decides_what_is_drawn(name: str) -> None:
+    drawn, plain = geared(name, 4), geared("random", 4)
+    assert drawn.robot.values == plain.robot.values
+    q = plain.robot.random_configurations(50, np.random.default_rng(1))
+    away = [drawn.frames(q)[t.name][:, :3, 3] - plain.frames(q)[t.name][:, :3, 3] for t in plain.robot.targets]
+    assert 2e-5 < float(np.linalg.norm(away, axis=2).mean()) < 4e-4  # 0.011 deg at half a metre, of six joints
+    assert geared(name, 1).joints == geared(name, 1).joints != geared(name, 2).joints
+
+
+def test_a_joint_that_slides_has_no_gear() -> None:
+    joints = (Joint("J1", "revolute", {"a": 0.3}), Joint("J2", "prismatic", {}))
+    drawn = truth_twin(Robot("lift", "", "", "standard-dh", joints), "gear-errors", np.random.default_rng(0))
+    assert drawn.joints[1].gear
+    assert drawn.joints[2] == JointTruth()
+
+
+def test_errors_are_drawn_without_the_models() -> None:
+    text = Path(gear_errors.__file__).read_text()
+    imports = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
+    names = {alias.name for node in imports if node.module and "engine.robot" in node.module for alias in node.names}
+    assert names == {"Robot"}  # whose joints turn

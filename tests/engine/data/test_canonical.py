@@ -16,6 +16,7 @@ from tests.engine.robot.refusing import refused
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text, read_csv
+from truearm.engine.data.readers.configurations import read_poses
 
 HEADER = "configuration,joint_1 [deg],joint_2 [deg],target,x [mm],y [mm],z [mm]"
 PLAIN = f"""{HEADER}
@@ -377,21 +378,18 @@ UNDER_LOAD = f"""{HEADER},temperature [degC],{PULL}
 
 def test_circumstances_belong_to_configurations(write: WriteFile) -> None:
     data = read_csv(write(UNDER_LOAD))
-    assert data.temperature is not None
     assert data.wrench is not None
-    assert data.temperature.tolist() == [21.5, -4.0, 22.125]
+    np.testing.assert_array_equal(data.temperature, [21.5, -4.0, 22.125])
     assert data.wrench.tolist() == [[10, -0.5, 0.1, 0, 1.25, -3], [0] * 6, [0.30000000000000004, *[0] * 5]]
     assert data.postures.wrench is data.wrench
     part = data.of_configurations([2, 0])
-    assert part.temperature is not None
-    assert part.temperature.tolist() == [22.125, 21.5]
+    np.testing.assert_array_equal(part.temperature, [22.125, 21.5])
 
 
 def test_a_force_may_come_without_a_moment(write: WriteFile) -> None:
     header = f"{HEADER},force_x [N],force_y [N],force_z [N]"
     data = read_csv(write(f"{header}\nc,1,2,t,1,2,3,5,6,7\n"))
-    assert data.wrench is not None
-    assert data.wrench.tolist() == [[5, 6, 7, 0, 0, 0]]
+    np.testing.assert_array_equal(data.wrench, [[5, 6, 7, 0, 0, 0]])
     assert read_csv(write(PLAIN)).wrench is None
     assert read_csv(write(PLAIN)).temperature is None
 
@@ -409,10 +407,8 @@ def test_circumstances_are_written_as_they_were_read(write: WriteFile) -> None:
 
 def test_numbers_are_the_order_of_measurement(write: WriteFile) -> None:
     data = read_csv(write(UNDER_LOAD))  # 1, 2, 3 were measured in this order: 0, 5, 10 deg
-    assert data.number is not None
-    assert data.approach is not None
-    assert data.number.tolist() == [2, 0, 1]
-    assert data.approach.tolist() == [[1, -1], [0, 0], [1, 0]]
+    np.testing.assert_array_equal(data.number, [2, 0, 1])
+    np.testing.assert_array_equal(data.approach, [[1, -1], [0, 0], [1, 0]])
 
 
 def test_numbers_count_from_the_first_of_the_campaign_and_other_labels_say_nothing(write: WriteFile) -> None:
@@ -440,21 +436,61 @@ def test_a_circumstance_that_changes_within_a_configuration(write: WriteFile) ->
 def test_visits_of_a_configuration_are_read_and_written(write: WriteFile) -> None:
     text = VISITED.replace("VISIT", "1") + "1,0.0,b,2,1.0,2.0,3.0\n2,10.0,a,1,1.0,2.0,3.0\n"
     data = read_csv(write(text))
-    assert data.visit is not None
-    assert data.visit.tolist() == [1, 2, 1]
+    np.testing.assert_array_equal(data.visit, [1, 2, 1])
     assert csv_text(data) == text
     part = data.of_configurations([1, 0]).of_readings([2, 0])
-    assert part.visit is not None
-    assert part.visit.tolist() == [1, 1]
+    np.testing.assert_array_equal(part.visit, [1, 1])
 
 
 def test_the_column_order_says_when_each_configuration_was_measured(write: WriteFile) -> None:
     rows = "P7,2,10.0,a,1.0,2.0,3.0\nP7,2,10.0,b,1.0,2.0,3.0\n3,1,0.0,a,1.0,2.0,3.0\n1,4,5.0,a,1.0,2.0,3.0\n"
     data = read_csv(write(ORDERED + rows))
-    assert data.number is not None
     assert data.approach is not None
-    assert data.number.tolist() == [1, 0, 3]
+    np.testing.assert_array_equal(data.number, [1, 0, 3])
     assert data.approach[:, 0].tolist() == [1, 0, 0]  # nothing is known of the way to 1: the third is not there
     assert csv_text(data) == ORDERED + rows
     assert "order" in csv_text(Dataset.of([[0.1], [0.2]], [[1, 2, 3]] * 2, configurations=["1", "2"], order=[2, 1]))
     assert "order" not in csv_text(Dataset.of([[0.1], [0.2]], [[1, 2, 3]] * 2, configurations=["1", "2"], order=[1, 2]))
+
+
+# -- pose files: what they may look like
+
+POSE_HEAD = "pose,x [mm],y [mm],z [mm],qw,qx,qy,qz\n"
+POSE_ROW = "P1,300,0,500,1,0,0,0\n"
+
+
+def test_pose_files_come_in_any_order_and_unit(tmp_path: Path) -> None:
+    file = tmp_path / "poses.csv"
+    file.write_text("qz,qy,qx,qw,z [m],y [mm],x [um],pose\n0,0.6,0,0.8002,0.5,-20,300000,a b\n")
+    poses = read_poses(file)
+    assert poses.labels == ("a b",)
+    assert poses.position == pytest.approx(np.array([[0.3, -0.02, 0.5]]))
+    assert poses.quaternion is not None
+    assert np.linalg.norm(poses.quaternion) == pytest.approx(1, abs=1e-15)
+    assert poses.quaternion[0] == pytest.approx([0.8, 0, 0.6, 0], abs=2e-4)
+    file.write_text("pose,x [mm],y [mm],z [mm]\n1,1,2,3\n")
+    assert read_poses(file).quaternion is None
+
+
+def test_pose_files_that_are_none_are_refused(tmp_path: Path) -> None:
+    for words, text in (
+        ("no unit is given", POSE_HEAD.replace("x [mm]", "x") + POSE_ROW),
+        ("does not fit here", POSE_HEAD.replace("x [mm]", "x [deg]") + POSE_ROW),
+        ("takes no unit", POSE_HEAD.replace("qw", "qw [1]") + POSE_ROW),
+        ("Did you mean pose", POSE_HEAD.replace("pose", "poses") + POSE_ROW),
+        ("appears twice", POSE_HEAD.replace("qx", "qw") + POSE_ROW),
+        ("column z is missing", POSE_HEAD.replace("z [mm],", "") + POSE_ROW.replace("500,", "")),
+        ("column qz is missing", POSE_HEAD.replace(",qz", "") + POSE_ROW.replace(",0\n", "\n")),
+        ("'P1' appears twice", POSE_HEAD + POSE_ROW + POSE_ROW),
+        ("does not have length 1", POSE_HEAD + POSE_ROW.replace(",1,", ",1.002,")),
+        ("NaN and infinity", POSE_HEAD + POSE_ROW.replace("300", "nan")),
+        ("cell is empty", POSE_HEAD + POSE_ROW.replace("300", "")),
+        ("cell is empty", POSE_HEAD + POSE_ROW.replace("P1", "")),
+        ("not separated by commas", POSE_HEAD.replace(",", ";") + POSE_ROW.replace(",", ";")),
+        ("a header and no rows", POSE_HEAD),
+        ("file is empty", ""),
+    ):
+        file = tmp_path / "poses.csv"
+        file.write_text(text)
+        with refused(words, of=text):
+            read_poses(file)

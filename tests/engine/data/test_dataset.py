@@ -388,11 +388,9 @@ def test_a_dataset_is_short() -> None:
 
 def test_visits_are_given_for_each_configuration_or_each_target() -> None:
     data = Dataset.of(joints(3), positions(3), visit=[1, 1, 2])
-    assert data.visit is not None
-    assert data.visit.tolist() == [1, 1, 1, 1, 2, 2]
+    np.testing.assert_array_equal(data.visit, [1, 1, 1, 1, 2, 2])
     several = Dataset.of(joints(2), np.zeros((2, 3, 3)), visit=[[1, 2, 3], [1, 1, 2]])
-    assert several.visit is not None
-    assert several.visit.tolist() == [1, 2, 3, 1, 1, 2]
+    np.testing.assert_array_equal(several.visit, [1, 2, 3, 1, 1, 2])
     assert "visits" in repr(several)
 
 

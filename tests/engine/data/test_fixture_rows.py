@@ -41,8 +41,7 @@ def read(text: str, folder: Path) -> Dataset:
 def test_distances_need_no_position_columns(tmp_path: Path) -> None:
     data = read(DISTANCES, tmp_path)
     assert data.fixtures == ("cup", "cap")
-    assert data.fixture is not None
-    assert data.fixture.tolist() == [0, 1, 0]
+    np.testing.assert_array_equal(data.fixture, [0, 1, 0])
     assert data.distance is not None
     assert data.distance[:2].tolist() == [0.3, 0.2995]
     assert np.isnan(data.distance[2])
@@ -57,8 +56,6 @@ def test_every_sort_of_row_means_what_it_says(tmp_path: Path) -> None:
     assert data.targets == ("tcp", "tip", "ball", "part")
     assert data.fixtures == ("plate", "cup", "table", "cap")
     assert data.against.tolist() == [-1, 0, 1, 2, 0, 3]
-    assert data.distance is not None
-    assert data.height is not None
     assert data.sigma is not None
     np.testing.assert_array_equal(data.distance, [np.nan, np.nan, 0.30025, np.nan, np.nan, 0.29975])
     np.testing.assert_array_equal(data.height, [np.nan, 0.0, np.nan, np.nan, -0.75e-3, np.nan])
@@ -81,7 +78,6 @@ def test_rows_of_the_role_fixture_are_the_setup(tmp_path: Path) -> None:
     assert setup.fixtures == ("plate", "cup", "table", "cap")
     assert setup.against.tolist() == [-1, 1]
     np.testing.assert_allclose(setup.position, [[0.1, 0.2, 0.3], [np.nan] * 3])
-    assert setup.distance is not None
     np.testing.assert_array_equal(setup.distance, [np.nan, 0.25])
     assert setup.sigma is not None
     np.testing.assert_allclose(setup.sigma, [2e-5, 1e-6])
@@ -117,7 +113,6 @@ def test_some_configurations_keep_all_that_is_known_of_fixtures(tmp_path: Path) 
     some = data.of_configurations([2, 0])
     assert some.setup is data.setup
     assert some.fixtures == data.fixtures
-    assert some.distance is not None
     np.testing.assert_array_equal(some.distance, [np.nan, np.nan, 0.29975])
     assert some.against.tolist() == [-1, 0, 3]
 

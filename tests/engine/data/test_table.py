@@ -74,8 +74,7 @@ def test_references_fixed_sigma_and_a_fixed_target_name(tmp_path: Path) -> None:
     assert data.targets == ("one",)
     assert data.references is not None
     assert data.references.targets == ("two",)
-    assert data.sigma is not None
-    assert data.sigma.tolist() == [2e-5, 2e-5]
+    np.testing.assert_array_equal(data.sigma, [2e-5, 2e-5])
     table = "\n".join(LONG.splitlines()[::2])
     fixed = read(tmp_path, table, MAP.replace("target_column: ball", "target: tcp"))
     assert fixed.targets == ("tcp",)
@@ -207,7 +206,6 @@ def test_the_guides_examples_all_say_the_same(guide: Path) -> None:
         np.testing.assert_array_equal(data.joints, canonical.joints)
         np.testing.assert_array_equal(data.position[:3], canonical.position[:3])
     assert wide.labels == spatial.labels == canonical.labels
-    assert spatial.sigma is not None
     assert canonical.sigma is not None
     np.testing.assert_array_equal(spatial.sigma, canonical.sigma[:3])
     assert wide.has_position.tolist() == [True, True, True, False]

@@ -12,6 +12,7 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
 from tests.engine.robot.refusing import refused
+from tests.engine.robot.test_loads import by_pinocchio, motion, random_link, random_triple
 
 from truearm.engine.data import inclinations as inclinometer
 from truearm.engine.robot.chain import Array
@@ -89,56 +90,25 @@ def test_a_wrench_on_the_flange_reaches_every_joint() -> None:
 
 
 @pytest.mark.parametrize("kinds", ["RRRRRR", "RPRRPR", "PPPRRR"])
-@pytest.mark.parametrize("seed", [0, 1])
-def test_moving_loads_are_those_of_pinocchio(kinds: str, seed: int) -> None:
-    pin = pytest.importorskip("pinocchio")
-    rng = RNG(seed)
-    model = pin.Model()
-    gravity = rng.normal(size=3) * 8
-    model.gravity.linear = gravity
-    joints, masses, after = [], [], pin.SE3.Identity()
-    for number, kind in enumerate(kinds, 1):
-        row = {name: float(rng.uniform(-1, 1)) for name in ("alpha", "a", "theta_offset", "d")}
-        joints.append(Joint(f"J{number}", "revolute" if kind == "R" else "prismatic", row))
-        turn_x = pin.SE3(pin.AngleAxis(row["alpha"], np.array([1.0, 0, 0])).toRotationMatrix(), np.array([0.0, 0, 0]))
-        turn_z = pin.SE3(pin.AngleAxis(row["theta_offset"], np.array([0, 0, 1.0])).toRotationMatrix(), np.zeros(3))
-        slide_x, slide_z = (pin.SE3(np.eye(3), row[c] * np.eye(3)[i]) for c, i in (("a", 0), ("d", 2)))
-        placement = after * turn_x * slide_x * turn_z
-        if kind == "R":
-            joint, after = model.addJoint(number - 1, pin.JointModelRZ(), placement, f"J{number}"), slide_z
-        else:
-            joint = model.addJoint(number - 1, pin.JointModelPZ(), placement * slide_z, f"J{number}")
-            after = pin.SE3.Identity()
-        for _ in range(number % 3):  # none, one or two bodies on a link
-            body = pin.Inertia.Random()
-            I = body.inertia  # noqa: E741
-            entries = (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2])
-            cx, cy, cz = map(float, body.lever)
-            masses.append(LinkMass(number, body.mass, (cx, cy, cz), tuple(map(float, entries))))  # type: ignore[arg-type]
-            model.appendBodyToJoint(joint, body, after)
-    flange = Transform((0.1, -0.2, 0.3), (0.5, 0.5, -0.5, 0.5))
-    payload = Payload(1.3, (0.05, 0.02, 0.1))
-    to_flange = after * pin.SE3(flange.rotation, np.array(flange.translation))
-    model.appendBodyToJoint(joint, pin.Inertia(payload.mass, np.array(payload.cog), np.zeros((3, 3))), to_flange)
-    gx, gy, gz = map(float, gravity)
-    arm = Robot("random", "", "", "modified-dh", tuple(joints), flange, tuple(masses), payload, gravity=(gx, gy, gz))
-    q, velocity, acceleration = rng.normal(size=(3, len(kinds)))
-    wrench = rng.normal(size=6) * 20
-
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    tip = pin.SE3(np.eye(3), (data.oMi[joint] * to_flange).translation)
-    outside = pin.StdVec_Force()
-    for _ in range(model.njoints - 1):
-        outside.append(pin.Force.Zero())
-    outside.append(data.oMi[joint].actInv(tip.act(pin.Force(wrench))))
-    pin.rnea(model, data, q, velocity, acceleration, outside)
-    reaction = np.array([np.concatenate([f.linear, f.angular]) for f in list(data.f)[1:]])
-
-    posture = Twin(arm).postures(
-        q[None], wrench=wrench[None], velocity=velocity[None], acceleration=acceleration[None]
-    )[0]
-    assert_allclose(posture.loads, -reaction, rtol=0, atol=1e-11 * np.abs(reaction).max())
+def test_moving_loads_are_those_of_pinocchio(kinds: str) -> None:
+    columns = ("alpha", "a", "theta_offset", "d")
+    for seed in (0, 1):
+        rng = RNG(seed)
+        rows = [{name: float(rng.uniform(-1, 1)) for name in columns} for _ in kinds]
+        joints = [
+            Joint(f"J{number}", "revolute" if kind == "R" else "prismatic", row)
+            for number, (kind, row) in enumerate(zip(kinds, rows, strict=True), 1)
+        ]
+        masses = [random_link(number, rng) for number in range(1, len(kinds) + 1) for _ in range(number % 3)]
+        flange, payload = Transform((0.1, -0.2, 0.3), (0.5, 0.5, -0.5, 0.5)), Payload(1.3, (0.05, 0.02, 0.1))
+        arm = Robot("random", "", "", "modified-dh", tuple(joints), flange, tuple(masses), payload)
+        arm = replace(arm, gravity=random_triple(rng, 8.0))
+        q, velocity, acceleration, wrench = motion(arm, rng)
+        expected = by_pinocchio(arm, q, velocity, acceleration, 20 * wrench)
+        at_work: Conditions = {"wrench": 20 * wrench.T, "velocity": velocity.T, "acceleration": acceleration.T}
+        for k, posture in enumerate(Twin(arm).postures(q.T, **at_work)):
+            own = expected[:, :, k]
+            assert_allclose(posture.loads, own, rtol=0, atol=1e-11 * np.abs(own).max(), err_msg=f"seed {seed}")
 
 
 def test_axes_of_a_joint_in_any_direction() -> None:

@@ -134,7 +134,7 @@ def test_frames_in_an_exported_file_are_those_of_urdf() -> None:
 def test_a_tilted_flange_is_said_to_be_left_out() -> None:
     arm = load_robot("ur5e").with_values({"alpha_6": 0.002, "a_6": 1e-3, "base_x": 1.0})
     said = " ".join(exported(arm, "ur-kinematics").left_out)
-    assert "cannot hold a flange beside the last axis" in said
+    assert "cannot hold a flange beside the last axis; left out: 1 mm and 0.1146 deg" in said
     assert "base_x" in said
 
 

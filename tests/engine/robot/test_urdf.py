@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests.arms import ARMS
 from tests.engine.robot.refusing import refused
+from tests.engine.robot.test_chain import random_robot
 
 from truearm.engine.robot.chain import Array, Chain
 from truearm.engine.robot.conventions import CONVENTIONS
@@ -598,18 +599,13 @@ def test_new_file_of_library_robot(robot_id: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)
 def test_new_file_of_robot_of_any_convention(convention: Convention, tmp_path: Path) -> None:
     kinds: tuple[JointKind, ...] = ("revolute", "prismatic", "revolute", "revolute", "prismatic")
+    limits = ((-0.5, 0.25), (-0.5, 0.25), (-0.5, 0.25), None, (-0.5, 0.25))
     masses = (LinkMass(2, 1.5, (0.1, 0.2, -0.3)), LinkMass(5, 0.5, (0.0, 0.0, 0.1)))
-    flange = Transform((0.1, 0.0, 0.2), (0.1, -0.7, 0.1, 0.7))
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        joints = []
-        for number, kind in enumerate(kinds, 1):
-            row = {column: float(rng.uniform(-0.5, 0.5)) for column in convention.row_units(kind)}
-            if "axis_x" in row:
-                row |= {"axis_x": 0.36, "axis_y": -0.48, "axis_z": 0.8}
-            joints.append(Joint(f"J{number}", kind, row, (-0.5, 0.25) if number < 4 or kind == "prismatic" else None))
-        robot = Robot("made", "", "", convention.name, tuple(joints), flange, masses)
-        check_new_file(shifted(robot, rng, 0.1), tmp_path)
+        robot = random_robot(convention, (), rng, kinds)
+        joints = tuple(replace(j, limits=own) for j, own in zip(robot.joints, limits, strict=True))
+        check_new_file(shifted(replace(robot, joints=joints, masses=masses), rng, 0.1), tmp_path)
 
 
 def test_velocities_of_limits_are_the_speeds_of_the_joints_and_what_is_not_known_is_said(tmp_path: Path) -> None:

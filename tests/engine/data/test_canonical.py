@@ -474,21 +474,12 @@ def test_pose_files_come_in_any_order_and_unit(tmp_path: Path) -> None:
 
 def test_pose_files_that_are_none_are_refused(tmp_path: Path) -> None:
     for words, text in (
-        ("no unit is given", POSE_HEAD.replace("x [mm]", "x") + POSE_ROW),
-        ("does not fit here", POSE_HEAD.replace("x [mm]", "x [deg]") + POSE_ROW),
-        ("takes no unit", POSE_HEAD.replace("qw", "qw [1]") + POSE_ROW),
         ("Did you mean pose", POSE_HEAD.replace("pose", "poses") + POSE_ROW),
-        ("appears twice", POSE_HEAD.replace("qx", "qw") + POSE_ROW),
         ("column z is missing", POSE_HEAD.replace("z [mm],", "") + POSE_ROW.replace("500,", "")),
         ("column qz is missing", POSE_HEAD.replace(",qz", "") + POSE_ROW.replace(",0\n", "\n")),
         ("'P1' appears twice", POSE_HEAD + POSE_ROW + POSE_ROW),
         ("does not have length 1", POSE_HEAD + POSE_ROW.replace(",1,", ",1.002,")),
-        ("NaN and infinity", POSE_HEAD + POSE_ROW.replace("300", "nan")),
-        ("cell is empty", POSE_HEAD + POSE_ROW.replace("300", "")),
-        ("cell is empty", POSE_HEAD + POSE_ROW.replace("P1", "")),
-        ("not separated by commas", POSE_HEAD.replace(",", ";") + POSE_ROW.replace(",", ";")),
         ("a header and no rows", POSE_HEAD),
-        ("file is empty", ""),
     ):
         file = tmp_path / "poses.csv"
         file.write_text(text)

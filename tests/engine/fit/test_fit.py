@@ -154,6 +154,15 @@ def test_moving_the_instrument_moves_the_base_and_nothing_else(
     np.testing.assert_allclose(errors[0], errors[1], atol=1e-9)
 
 
+def test_measuring_everything_twice_narrows_the_deviations() -> None:
+    _, data = campaign("irb120", 30, 0.05e-3, 6)
+    twice = data.of_readings(np.tile(np.arange(len(data.target)), 2))
+    twice = replace(twice, visit=np.repeat([1, 2], len(data.target)))
+    a, b = (identify(load_robot("irb120"), d, GEOMETRIC).robot.parameters for d in (data, twice))
+    for name in ("theta_offset_2", "a_3", "alpha_4"):
+        assert a[name].deviation == pytest.approx(np.sqrt(2) * b[name].deviation, rel=0.02)
+
+
 def test_undeclared_noise_is_estimated_and_noise_beyond_the_declared_widens_the_deviations() -> None:
     _, data = campaign("irb120", 80, 0.2e-3, 6)
     small = np.full(len(data.target), 0.05e-3)

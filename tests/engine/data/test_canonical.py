@@ -474,6 +474,8 @@ def test_pose_files_come_in_any_order_and_unit(tmp_path: Path) -> None:
 
 def test_pose_files_that_are_none_are_refused(tmp_path: Path) -> None:
     for words, text in (
+        ("takes no unit", POSE_HEAD.replace("qw", "qw [1]") + POSE_ROW),
+        ("appears twice", POSE_HEAD.replace("qx", "qw") + POSE_ROW),
         ("Did you mean pose", POSE_HEAD.replace("pose", "poses") + POSE_ROW),
         ("column z is missing", POSE_HEAD.replace("z [mm],", "") + POSE_ROW.replace("500,", "")),
         ("column qz is missing", POSE_HEAD.replace(",qz", "") + POSE_ROW.replace(",0\n", "\n")),

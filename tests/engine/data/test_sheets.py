@@ -100,6 +100,7 @@ def test_refusals_name_the_cell(tmp_path: Path) -> None:
     wrong: list[tuple[Callable[[Any], None], str]] = [
         (put("D3", "=1840+1.25"), "cell.xlsx, 'Cell 4'!D3: the formula has no value in the file; got '=1840+1.25'"),
         (put("B2", "=1"), "'Cell 4'!B2: the formula has no value"),
+        (put("D3", "x"), "'Cell 4'!D3: a number belongs here; got 'x'"),
         (put("B5", None), "'Cell 4'!B5: the cell is empty"),
         (put("I5", "note"), "'Cell 4'!I5: this cell has no name in the header; got 'note'"),
         (put("G5", "yesterday"), "'Cell 4'!G5: this is no time"),

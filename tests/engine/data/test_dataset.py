@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from tests.engine.robot.refusing import refused
 
 from truearm import calibrate, check
-from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.thinning import repeated_joints
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
@@ -57,13 +59,6 @@ def sound() -> Dataset:
         wrench=rng.uniform(0, 1, (N, 6)),
         references=beside,
     )
-
-
-def refused(parameter: str, call: Any, *words: Any, **options: Any) -> str:
-    with pytest.raises(InputError) as caught:
-        call(*words, **options)
-    assert caught.value.parameter == parameter
-    return str(caught.value)
 
 
 # -- from arrays ------------------------------------------------------------------------------------------
@@ -112,57 +107,34 @@ def test_of_an_order_knows_the_last_moves() -> None:
     assert_array_equal(Dataset.of(q, positions(), order=np.array(order) - 1).number, data.number)
 
 
-def test_arrays_can_be_calibrated() -> None:
-    true = off_nominal()
-    q = true.random_configurations(40, np.random.default_rng(0))
-    position, _ = true.forward(q, frame="world", target="1")
-    found = calibrate("irb120", Dataset.of(q, position, sigma=1e-5), train="all")
-    predicted, _ = found.robot.forward(q, frame="world", target="1")
-    assert np.abs(predicted - position).max() < 2e-5
-
-
-@pytest.mark.parametrize(
-    ("parameter", "changed"),
-    [
-        ("joints", {"joints": np.full((N, 6), NAN)}),
-        ("joints", {"joints": np.zeros(6)}),
-        ("joints", {"joints": np.zeros((0, 6))}),
-        ("joints", {"joints": "q"}),
-        ("positions", {"positions": positions()[:4]}),
-        ("positions", {"positions": positions()[:, :, :2]}),
-        ("positions", {"positions": positions()[:, 0, 0]}),
-        ("positions", {"positions": np.full((N, 3), INFINITY)}),
-        ("positions", {"positions": np.zeros((N, 0, 3))}),
-        ("positions", {"positions": [[0.0] * 3, [0.0] * 2]}),
-        ("positions", {"positions": None}),
-        ("targets", {"targets": ["a"]}),
-        ("targets", {"targets": ["a", "a"]}),
-        ("targets", {"targets": "ab"}),
-        ("targets", {"targets": [None, "a"]}),
-        ("configurations", {"configurations": range(3)}),
-        ("configurations", {"configurations": [1, 2, 3, 4, 5, 5]}),
-        ("configurations", {"configurations": 6}),
-        ("quaternions", {"quaternions": np.ones((N, 2, 4))}),
-        ("quaternions", {"quaternions": np.ones((N, 4))}),
-        ("sigma", {"sigma": 0.0}),
-        ("sigma", {"sigma": -1e-5}),
-        ("sigma", {"sigma": NAN}),
-        ("sigma", {"sigma": np.ones(2)}),
-        ("sigma", {"sigma": "0.02 mm"}),
-        ("sigma_rot", {"sigma_rot": 0.0}),
-        ("order", {"order": [1, 2, 3, 4, 5, 5]}),
-        ("order", {"order": [1, 2, 3, 4, 5, 6.5]}),
-        ("order", {"order": [-1, 2, 3, 4, 5, 6]}),
-        ("order", {"order": "rows"}),
-        ("temperature", {"temperature": [20.0] * 5}),
-        ("temperature", {"temperature": NAN}),
-        ("joint_kinds", {"joint_kinds": ["revolute"] * 5}),
-        ("joint_kinds", {"joint_kinds": ["revolut"] * 6}),
-        ("joint_kinds", {"joint_kinds": "revolute"}),
-    ],
-)
-def test_arrays_that_do_not_fit_are_refused(parameter: str, changed: dict[str, Any]) -> None:
-    refused(parameter, Dataset.of, **{"joints": joints(), "positions": positions()} | changed)
+def test_arrays_that_do_not_fit_are_refused() -> None:
+    wrong: dict[str, list[Any]] = {
+        "joints": [np.full((N, 6), NAN), np.zeros(6), np.zeros((0, 6)), "q", 1e7 * np.ones((N, 6))],
+        "positions": [
+            *(positions()[:4], positions()[:, :, :2], positions()[:, 0, 0], np.full((N, 3), INFINITY)),
+            *(np.zeros((N, 0, 3)), [[0.0] * 3, [0.0] * 2], None, 1e200 * positions()),
+        ],
+        "targets": [["a"], ["a", "a"], "ab", [None, "a"]],
+        "configurations": [range(3), [1, 2, 3, 4, 5, 5], 6],
+        "quaternions": [np.ones((N, 2, 4)), np.ones((N, 4))],
+        "sigma": [0.0, -1e-5, NAN, np.ones(2), "0.02 mm", 1e-200, 2e3],
+        "sigma_rot": [0.0, 11.0],
+        "order": [[1, 2, 3, 4, 5, 5], [1, 2, 3, 4, 5, 6.5], [-1, 2, 3, 4, 5, 6], "rows", 1e200 * np.arange(N)],
+        "temperature": [[20.0] * 5, NAN, 1e7],
+        "joint_kinds": [["revolute"] * 5, ["revolut"] * 6, "revolute"],
+        "visit": [[1, 2], [1.5] * N, [-1] * N, [NAN] * N],
+    }
+    given: dict[str, Any] = {"joints": joints(), "positions": positions(), "order": np.arange(N)}
+    given |= {"sigma": np.ones(N), "temperature": np.ones(N)}
+    for parameter in ("joints", "sigma", "temperature", "order"):  # where nothing may be missing
+        wrong[parameter].append(np.ma.array(given[parameter], mask=given[parameter] == given[parameter].flat[0]))
+    for parameter, values in wrong.items():
+        for value in values:
+            with refused(parameter=parameter, of=f"{parameter} {value!r}"):
+                Dataset.of(**given | {parameter: value})
+    for parameter, value in (("joints", 1e7 * np.ones((N, 6))), ("sigma", 2e3), ("order", 1e200 * np.arange(N))):
+        with refused("plausible", of=parameter):  # they ended in LinAlgError and OverflowError far from here
+            Dataset.of(**given | {parameter: value})
 
 
 def test_masked_positions_and_quaternions_are_missing() -> None:
@@ -183,14 +155,6 @@ def test_masked_positions_and_quaternions_are_missing() -> None:
     assert_array_equal(Dataset.of(np.ma.array(joints()), p).joints, joints())
 
 
-@pytest.mark.parametrize("parameter", ["joints", "sigma", "temperature", "order"])
-def test_masked_numbers_are_refused_elsewhere(parameter: str) -> None:
-    given: dict[str, Any] = {"joints": joints(), "positions": positions(), "order": np.arange(N)}
-    given |= {"sigma": np.ones(N), "temperature": np.ones(N)}
-    values = given[parameter]
-    refused(parameter, Dataset.of, **given | {parameter: np.ma.array(values, mask=values == values.flat[0])})
-
-
 def test_a_dataset_keeps_its_own_arrays() -> None:
     given: dict[str, Any] = {
         "joints": joints(),
@@ -203,33 +167,17 @@ def test_a_dataset_keeps_its_own_arrays() -> None:
     same(data, before)
 
 
-@pytest.mark.parametrize("name", ["", " ", "a\nb", "a\x00", "\ud800", "\u2028"], ids=ascii)
-def test_names_that_no_file_can_hold_are_refused(name: str) -> None:
-    p = positions(1, 1)
-    refused("targets", Dataset.of, joints(1), p, targets=[name])
-    refused("configurations", Dataset.of, joints(1), p, configurations=[name])
-    for field in ("targets", "labels", "fixtures"):
-        if (field, name) != ("labels", ""):  # what is known of fixtures belongs to no configuration
-            refused(field, replace, Dataset.of(joints(1), p), **{field: (name,)})
-    assert Dataset.of(joints(1), p, targets=["Kugel\u00a01 \u00fc"]).targets == ("Kugel\u00a01 \u00fc",)
-
-
-@pytest.mark.parametrize(
-    ("parameter", "changed"),
-    [
-        ("joints", {"joints": 1e7 * np.ones((N, 6))}),
-        ("positions", {"positions": 1e200 * positions()}),
-        ("sigma", {"sigma": 1e-200}),
-        ("sigma", {"sigma": 2e3}),
-        ("sigma_rot", {"sigma_rot": 11.0}),
-        ("temperature", {"temperature": 1e7}),
-        ("order", {"order": 1e200 * np.arange(N)}),
-    ],
-)
-def test_numbers_out_of_all_proportion_are_refused(parameter: str, changed: dict[str, Any]) -> None:
-    """They ended in LinAlgError and OverflowError far from here; a file is refused for them too."""
-    said = refused(parameter, Dataset.of, **{"joints": joints(), "positions": positions()} | changed)
-    assert "plausible" in said
+def test_names_that_no_file_can_hold_are_refused() -> None:
+    q, p = joints(1), positions(1, 1)
+    for name in ("", " ", "a\nb", "a\x00", "\ud800", "\u2028"):
+        for parameter in ("targets", "configurations"):
+            with refused(parameter=parameter, of=ascii(name)):
+                Dataset.of(q, p, **{parameter: [name]})  # type: ignore[arg-type]
+        for field in ("targets", "labels", "fixtures"):
+            if (field, name) != ("labels", ""):  # what is known of fixtures belongs to no configuration
+                with refused(parameter=field, of=ascii(name)):
+                    replace(Dataset.of(q, p), **{field: (name,)})  # type: ignore[arg-type]
+    assert Dataset.of(q, p, targets=["Kugel\u00a01 \u00fc"]).targets == ("Kugel\u00a01 \u00fc",)
 
 
 def test_times_may_say_the_order() -> None:
@@ -241,74 +189,52 @@ def test_times_may_say_the_order() -> None:
 # -- checks of its own ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("labels", ("1", "1", "2", "3", "4", "5")),
-        ("joints", np.full((N, 6), NAN)),
-        ("joints", np.zeros((N, 5))),
-        ("joints", [[0.0] * 6] * N),
-        ("joint_kinds", ("revolute",) * 5 + ("sliding",)),
-        ("targets", ("a", "a")),
-        ("configuration", np.full(2 * N, N)),
-        ("configuration", np.full(2 * N, -1)),
-        ("configuration", np.zeros(2 * N)),
-        ("target", np.full(2 * N, 2)),
-        ("position", np.zeros((2 * N, 2))),
-        ("position", np.full((2 * N, 3), INFINITY)),
-        ("quaternion", np.zeros((2 * N, 4))),
-        ("quaternion", np.zeros((2 * N, 3))),
-        ("distance", np.zeros(2)),
-        ("height", np.full(2 * N, INFINITY)),
-        ("fixture", np.full(2 * N, 1)),
-        ("fixture", np.full(2 * N, -2)),
-        ("sigma", np.zeros(2 * N)),
-        ("sigma", np.ones(N)),
-        ("sigma_rot", np.full(2 * N, -1.0)),
-        ("approach", np.zeros((N, 5))),
-        ("number", np.zeros(N + 1)),
-        ("temperature", np.full(N, NAN)),
-        ("wrench", np.full((N, 6), NAN)),
-        ("references", Dataset.of(joints(2), positions(2))),
-        ("references", "p"),
-        ("setup", 5),
-        ("source", None),
-        ("labels", None),
-        ("labels", "abcdef"),
-        ("labels", [1, 2, 3, 4, 5, 6]),
-        ("labels", (1, 2, 3, 4, 5, 6)),
-        ("targets", None),
-        ("targets", (1, 2)),
-        ("fixtures", 5),
-        ("joint_kinds", ("revolute",) * 5 + (None,)),
-        ("target", np.array(0)),
-        ("target", None),
-        ("configuration", None),
-        ("position", None),
-        ("position", np.ma.array(np.zeros((2 * N, 3)))),
-        ("position", np.full((2 * N, 3), 1e7)),
-        ("distance", np.full(2 * N, 1e200)),
-        ("approach", np.full((N, 6), 7.0)),
-        ("approach", np.full((N, 6), 0.5)),
-    ],
-)
-def test_a_dataset_checks_itself(field: str, value: Any) -> None:
-    data = sound()
-    wrong = replace(data, references=None) if field in ("labels", "joints", "joint_kinds") else data
-    refused("joints" if field == "joint_kinds" and len(value) < 6 else field, replace, wrong, **{field: value})
-
-
-@pytest.mark.parametrize("kinds", [5, None, ["revolute"] * 6])
-def test_kinds_of_joints_are_a_tuple(kinds: Any) -> None:
-    refused("joint_kinds", replace, sound(), joint_kinds=kinds)
+def test_a_dataset_checks_itself() -> None:
+    kinds = ("revolute",) * 5
+    wrong: dict[str, list[Any]] = {
+        "labels": [("1", "1", "2", "3", "4", "5"), None, "abcdef", [1, 2, 3, 4, 5, 6], (1, 2, 3, 4, 5, 6)],
+        "joints": [np.full((N, 6), NAN), np.zeros((N, 5)), [[0.0] * 6] * N],
+        "joint_kinds": [(*kinds, "sliding"), (*kinds, None), 5, None, ["revolute"] * 6],
+        "targets": [("a", "a"), None, (1, 2)],
+        "configuration": [np.full(2 * N, N), np.full(2 * N, -1), np.zeros(2 * N), None],
+        "target": [np.full(2 * N, 2), np.array(0), None],
+        "position": [
+            *(np.zeros((2 * N, 2)), np.full((2 * N, 3), INFINITY), None, np.ma.array(np.zeros((2 * N, 3)))),
+            np.full((2 * N, 3), 1e7),
+        ],
+        "quaternion": [np.zeros((2 * N, 4)), np.zeros((2 * N, 3))],
+        "distance": [np.zeros(2), np.full(2 * N, 1e200)],
+        "height": [np.full(2 * N, INFINITY)],
+        "fixtures": [5],
+        "fixture": [np.full(2 * N, 1), np.full(2 * N, -2)],
+        "sigma": [np.zeros(2 * N), np.ones(N)],
+        "sigma_rot": [np.full(2 * N, -1.0)],
+        "approach": [np.zeros((N, 5)), np.full((N, 6), 7.0), np.full((N, 6), 0.5)],
+        "number": [np.zeros(N + 1)],
+        "temperature": [np.full(N, NAN)],
+        "wrench": [np.full((N, 6), NAN)],
+        "visit": [np.ones(3), np.full(2 * N, 1.5), np.full(2 * N, -1)],
+        "references": [Dataset.of(joints(2), positions(2)), "p"],
+        "setup": [5],
+        "source": [None],
+    }
+    for field, values in wrong.items():
+        data = replace(sound(), references=None) if field in ("labels", "joints") else sound()
+        for value in values:
+            with refused(parameter=field, of=f"{field} {value!r}"):
+                replace(data, **{field: value})
+    with refused(parameter="joints"):  # of which there are six
+        replace(sound(), joint_kinds=kinds, references=None)
 
 
 def test_wrong_arrays_are_refused_before_a_job_starts() -> None:
     """They ended in LinAlgError, ValueError or IndexError far from here."""
     data = Dataset.of(joints(40), positions(40))
-    for job in (lambda d: calibrate("irb120", d), lambda d: check(d)):
-        for field, value in (("joints", data.joints * NAN), ("sigma", np.zeros(80)), ("position", np.zeros((80, 2)))):
-            refused(field, lambda job=job, field=field, value=value: job(replace(data, **{field: value})))
+    jobs: tuple[Callable[[Dataset], object], ...] = (lambda d: calibrate("irb120", d), check)
+    for field, value in (("joints", data.joints * NAN), ("sigma", np.zeros(80)), ("position", np.zeros((80, 2)))):
+        for job in jobs:
+            with refused(parameter=field):
+                job(replace(data, **{field: value}))  # type: ignore[arg-type]
 
 
 # -- parts ------------------------------------------------------------------------------------------------
@@ -402,8 +328,10 @@ def test_a_bootstrap_is_not_told_to_remove_its_copies() -> None:
 
 
 def test_a_check_of_nothing_is_refused() -> None:
-    refused("data", check, sound().of_configurations([]))
-    refused("data", check, load_robot("irb120"), Dataset.of(joints(), positions() * NAN))
+    with refused(parameter="data"):
+        check(sound().of_configurations([]))
+    with refused(parameter="data"):
+        check(load_robot("irb120"), Dataset.of(joints(), positions() * NAN))
 
 
 def test_readings_by_mask_by_index_and_twice() -> None:
@@ -424,30 +352,18 @@ def test_nothing_chosen_is_nothing() -> None:
         assert len(data.of_configurations(none).target) == 0
 
 
-@pytest.mark.parametrize(
-    "chosen",
-    [
-        [N],
-        [-1],
-        [0.0, 1.0],
-        [NAN],
-        [True] * (N - 1),
-        np.ones(2 * N + 1, dtype=bool),
-        [[0, 1]],
-        3,
-        "1",
-        None,
-        ["1"],
-        [True, 2],
-        (2, False),
-        np.array(0),
-        np.ma.array([0, 1], mask=[False, True]),
-    ],
-    ids=repr,
-)
-def test_what_chooses_nothing_that_is_there_is_refused(chosen: Any) -> None:
-    refused("chosen", sound().of_configurations, chosen)
-    refused("chosen", sound().of_readings, [2 * N] if isinstance(chosen, list) and chosen[0] is N else chosen)
+def test_what_chooses_nothing_that_is_there_is_refused() -> None:
+    masked = np.ma.array([0, 1], mask=[False, True])
+    wrong: list[Any] = [
+        *([2 * N], [-1], [0.0, 1.0], [NAN], [True] * (N - 1), np.ones(2 * N + 1, dtype=bool), [[0, 1]], 3, "1"),
+        *(None, ["1"], [True, 2], (2, False), np.array(0), masked),
+    ]
+    for chosen in wrong:
+        for part in (sound().of_configurations, sound().of_readings):
+            with refused(parameter="chosen", of=repr(chosen)):
+                part(chosen)
+    with refused(parameter="chosen"):
+        sound().of_configurations([N])
 
 
 # -- what it shows of itself ------------------------------------------------------------------------------
@@ -472,17 +388,38 @@ def test_a_dataset_is_short() -> None:
 
 def test_visits_are_given_for_each_configuration_or_each_target() -> None:
     data = Dataset.of(joints(3), positions(3), visit=[1, 1, 2])
-    assert data.visit is not None
-    assert data.visit.tolist() == [1, 1, 1, 1, 2, 2]
+    np.testing.assert_array_equal(data.visit, [1, 1, 1, 1, 2, 2])
     several = Dataset.of(joints(2), np.zeros((2, 3, 3)), visit=[[1, 2, 3], [1, 1, 2]])
-    assert several.visit is not None
-    assert several.visit.tolist() == [1, 2, 3, 1, 1, 2]
+    np.testing.assert_array_equal(several.visit, [1, 2, 3, 1, 1, 2])
     assert "visits" in repr(several)
 
 
-@pytest.mark.parametrize("visit", [[1, 2], [1.5, 1, 1], [-1, 1, 1], [np.nan, 1, 1]])
-def test_visits_that_are_no_whole_numbers_are_refused(visit: Any) -> None:
-    with pytest.raises(InputError, match="visit"):
-        Dataset.of(joints(3), positions(3), visit=visit)
-    with pytest.raises(InputError, match="visit"):
-        replace(Dataset.of(joints(3), positions(3)), visit=np.array(visit))
+def test_joints_copied_many_times_are_found_without_comparing_every_pair(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(1)
+    postures, visits, targets = 40, 25, 3
+    posture = np.tile(np.arange(postures), visits)
+    far = rng.random(len(posture)) < 0.1
+    far[:postures] = False
+    position = rng.normal(size=(postures, targets, 3))[posture] + 1e-5 * rng.normal(size=(len(posture), targets, 3))
+    position[far, rng.integers(targets, size=len(posture))[far], 0] += 0.02
+    rows = rng.permutation(len(posture) * targets)  # a table need not be sorted
+    data = Dataset(
+        source="many.csv",
+        labels=tuple(f"{c}" for c in range(len(posture))),
+        joints=rng.uniform(-1, 1, size=(postures, 6))[posture],
+        joint_kinds=("revolute",) * 6,
+        targets=("A", "B", "C"),
+        configuration=np.repeat(np.arange(len(posture)), targets)[rows],
+        target=np.tile(np.arange(targets), len(posture))[rows],
+        position=position.reshape(-1, 3)[rows],
+    )
+    compared: list[int] = []
+    norm = np.linalg.norm
+
+    def counted(values: Array, axis: int) -> Array:
+        compared.append(len(values))
+        return np.asarray(norm(values, axis=axis))
+
+    monkeypatch.setattr(np.linalg, "norm", counted)
+    assert repeated_joints(data) == [(f"{posture[c]}", f"{c}") for c in np.flatnonzero(far)]
+    assert sum(compared) == len(rows)

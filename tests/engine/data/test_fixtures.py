@@ -10,8 +10,8 @@ from typing import get_args
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
+from tests.engine.robot.refusing import refused
 
-from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Fixture, FixtureKind
@@ -93,32 +93,27 @@ def test_a_frame_slides_and_then_turns() -> None:
 
 
 def test_a_plane_is_two_turns_and_a_distance_along_its_normal() -> None:
-    robot = beside("plane")
-    assert [p.name for p in robot.parameters.values() if p.group == "fixture"] == [
-        "fixture_table_rx", "fixture_table_ry", "fixture_table_z"
-    ]  # fmt: skip
-    robot = moved(robot, "table")
-    normal = fixed(TURNED)[:3, 2]
-    away = float(normal @ np.array(PLACE.translation))
+    T = matrix_of(beside("plane"), "table")
+    assert (np.array(PLACE.translation) - T[:3, 3]) @ T[:3, 2] == pytest.approx(0.0, abs=1e-15)  # its place is in it
+    robot = moved(beside("plane"), "table")
+    own = ["fixture_table_rx", "fixture_table_ry", "fixture_table_z"]
+    assert [p.name for p in robot.parameters.values() if p.group == "fixture"] == own
+    away = float(fixed(TURNED)[:3, 2] @ np.array(PLACE.translation))
     expected = product(fixed(TURNED), turn(0, MOVES["rx"]), turn(1, MOVES["ry"]), slide(2, away + MOVES["z"]))
     np.testing.assert_allclose(matrix_of(robot, "table"), expected, atol=1e-15)
 
 
-def test_the_place_of_a_plane_is_in_the_plane() -> None:
-    T = matrix_of(beside("plane"), "table")
-    assert (np.array(PLACE.translation) - T[:3, 3]) @ T[:3, 2] == pytest.approx(0.0, abs=1e-15)
-
-
-@pytest.mark.parametrize("kind", get_args(FixtureKind))
-def test_many_trials_at_once_are_each_alone(kind: FixtureKind) -> None:
-    robot = beside(kind)
-    rng = np.random.default_rng(0)
-    trials = {n: v + 0.05 * rng.standard_normal((4, 1)) for n, v in robot.values.items() if n.startswith("fixture_")}
-    together = robot.fixture_kinematics("table", {**robot.values, **trials})
-    for k in range(4):
-        alone = robot.fixture_kinematics("table", {**robot.values, **{n: float(v[k, 0]) for n, v in trials.items()}})
-        np.testing.assert_allclose(together.position[:, k], alone.position, atol=1e-15)
+def test_many_trials_at_once_are_each_alone() -> None:
+    for kind in get_args(FixtureKind):
+        robot, rng = beside(kind), np.random.default_rng(0)
+        own = {n: v for n, v in robot.values.items() if n.startswith("fixture_")}
+        trials = {n: v + 0.05 * rng.standard_normal((4, 1)) for n, v in own.items()}
+        together = robot.fixture_kinematics("table", {**robot.values, **trials})
         assert together.position.shape == (3, 4, 1)
+        for k in range(4):
+            trial = {n: float(v[k, 0]) for n, v in trials.items()}
+            alone = robot.fixture_kinematics("table", {**robot.values, **trial})
+            np.testing.assert_allclose(together.position[:, k], alone.position, atol=1e-15, err_msg=kind)
 
 
 def test_other_fixtures_take_the_place_of_those_before_and_forget_their_values() -> None:
@@ -130,28 +125,21 @@ def test_other_fixtures_take_the_place_of_those_before_and_forget_their_values()
     assert dict(robot.with_fixtures({}).values) == dict(IRB120.values)
 
 
-def test_a_fixture_called_fixture_is_not_called_so_twice() -> None:
+def test_a_fixture_called_fixture_is_not_called_so_twice_and_may_share_a_targets_name() -> None:
     assert Fixture("fixture_7", "point").parameter("x") == "fixture_7_x"
     assert Fixture("7", "point").parameter("x") == "fixture_7_x"
+    robot = IRB120.with_frames(Transform(), {"ball": (0.0, 0.0, 0.1)}).with_fixtures({"ball": ("point", PLACE)})
+    assert {"target_ball_x", "fixture_ball_x"} <= set(robot.parameters)
 
 
-def test_two_fixtures_whose_parameters_would_have_one_name_are_refused() -> None:
-    with pytest.raises(InputError, match=r"fixture_7_x: two parameters .* same name.*Rename the target or fixture"):
+def test_an_unknown_fixture_and_two_of_one_name_are_refused() -> None:
+    for name in ("tabel", "wall"):
+        with refused(f"no fixture of this name; got '{name}'; allowed: table"):
+            beside("plane").fixture_kinematics(name)
+    with refused("none: the robot has no fixtures"):
+        IRB120.fixture("wall")
+    with refused("fixture_7_x: two parameters ", "same name", "Rename the target or fixture"):
         IRB120.with_fixtures({"7": ("point", PLACE), "fixture_7": ("point", PLACE)})
-
-
-def test_a_fixture_and_a_target_may_share_a_name() -> None:
-    robot = IRB120.with_frames(Transform(), {"ball": (0.0, 0.0, 0.1)})
-    both = robot.with_fixtures({"ball": ("point", PLACE)})
-    assert {"target_ball_x", "fixture_ball_x"} <= set(both.parameters)
-
-
-@pytest.mark.parametrize("name", ["tabel", "wall"])
-def test_an_unknown_fixture_is_refused_with_those_there_are(name: str) -> None:
-    with pytest.raises(InputError, match=rf"no fixture of this name; got '{name}'; allowed: table"):
-        beside("plane").fixture_kinematics(name)
-    with pytest.raises(InputError, match="none: the robot has no fixtures"):
-        IRB120.fixture(name)
 
 
 # -- robot files -----------------------------------------------------------------------------------------
@@ -168,53 +156,44 @@ NAMES = ("table", "7", "the left cup", "Größe: [x]", "yes", "'quoted'", "# no 
 
 
 @pytest.mark.parametrize("kind", get_args(FixtureKind))
-def test_a_robot_file_keeps_fixtures(tmp_path: Path, kind: FixtureKind) -> None:
+def test_a_robot_file_keeps_fixtures_and_what_was_identified_of_them(tmp_path: Path, kind: FixtureKind) -> None:
     robot = IRB120.with_fixtures(dict.fromkeys(NAMES, (kind, PLACE)))
     for name in NAMES:
         robot = moved(robot, name)
+    z = replace(robot.parameters["fixture_table_z"], value=0.123, deviation=2e-6, informed=0.99)
+    robot = robot.with_parameters([z])
     again = reread(robot, tmp_path)
     assert [(f.name, f.kind) for f in again.fixtures] == [(name, kind) for name in NAMES]
     assert again.values == pytest.approx(robot.values, rel=1e-14, abs=1e-18)
+    found = again.parameters["fixture_table_z"]
+    assert (found.deviation, found.informed) == pytest.approx((2e-6, 0.99), rel=1e-14)
     for name in NAMES:
         np.testing.assert_allclose(matrix_of(again, name), matrix_of(robot, name), atol=1e-14)
     assert robot_text(again) == robot_text(robot)
 
 
-def test_what_was_identified_of_a_fixture_stays_with_it(tmp_path: Path) -> None:
-    robot = beside("plane")
-    found = replace(robot.parameters["fixture_table_z"], value=0.123, deviation=2e-6, informed=0.99)
-    again = reread(robot.with_parameters([found]), tmp_path).parameters["fixture_table_z"]
-    assert (again.value, again.deviation, again.informed) == pytest.approx((0.123, 2e-6, 0.99), rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"kind": "line"}, "kind.*got .line.*allowed: point, plane, frame"),
-        ({"kind": None}, "kind"),
-        ({"quaternion": [1.0, 1.0, 0.0, 0.0]}, "quaternion.*length 1"),
-        ({"name": ""}, "name.*got .*one line"),
-        ({"name": "two\nlines"}, "name.*one line"),
-        ({"place": [0, 0, 0]}, "place"),
-    ],
-)
-def test_a_robot_file_refuses_what_is_no_fixture(tmp_path: Path, changed: dict[str, object], said: str) -> None:
-    yaml = YAML(typ="safe")
-    content = yaml.load(robot_text(beside("plane")))
-    content["fixtures"][0] |= changed
-    content["fixtures"][0] = {k: v for k, v in content["fixtures"][0].items() if v is not None}
-    content.pop("parameters")
+def test_a_robot_file_refuses_what_is_no_fixture(tmp_path: Path) -> None:
+    changes: list[tuple[dict[str, object], list[str]]] = [
+        ({"kind": "line"}, ["kind", "allowed: point, plane, frame"]),
+        ({"kind": None}, ["kind"]),
+        ({"quaternion": [1.0, 1.0, 0.0, 0.0]}, ["quaternion", "length 1"]),
+        ({"name": ""}, ["name", "one line"]),
+        ({"name": "two\nlines"}, ["name", "one line"]),
+        ({"place": [0, 0, 0]}, ["place"]),
+    ]
     path = tmp_path / "robot.yaml"
-    with path.open("w", encoding="utf-8") as stream:
-        YAML(typ="safe").dump(content, stream)
-    with pytest.raises(InputError, match=rf"robot.yaml.*fixtures.*{said}"):
-        read_robot(path)
-
-
-def test_a_robot_file_refuses_two_fixtures_of_one_name(tmp_path: Path) -> None:
+    text = robot_text(beside("plane"))
+    for changed, said in changes:
+        content = YAML(typ="safe").load(text)
+        content["fixtures"][0] |= changed
+        content["fixtures"][0] = {k: v for k, v in content["fixtures"][0].items() if v is not None}
+        content.pop("parameters")
+        with path.open("w", encoding="utf-8") as stream:
+            YAML(typ="safe").dump(content, stream)
+        with refused("robot.yaml, fixtures", *said, of=changed):
+            read_robot(path)
     text = robot_text(beside("point", Transform()))
     line = next(line for line in text.splitlines() if "kind: point" in line)
-    path = tmp_path / "robot.yaml"
     path.write_text(text.replace(line, f"{line}\n{line}"), encoding="utf-8")
-    with pytest.raises(InputError, match=r"two parameters of the robot would have the same name"):
+    with refused("two parameters of the robot would have the same name"):
         read_robot(path)

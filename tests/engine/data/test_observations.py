@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from scipy.spatial.transform import Rotation
+from tests.engine.robot.refusing import refused
 
-from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS, compared
 from truearm.engine.fit.problem import SETUP, Problem
@@ -87,7 +88,7 @@ def readings_of(robot: Robot, combinations: list[tuple[str, str | None]], seed: 
         if name == "position":
             of["position"][place] = T[:, :3, 3]
         elif name == "orientation" and target == "plate":
-            of["quaternion"][place] = np.array([quaternion(R) for R in T[:, :3, :3]])
+            of["quaternion"][place] = Rotation.from_matrix(T[:, :3, :3]).as_quat(scalar_first=True)
         elif name == "distance":
             of["length"][place, 0] = np.sqrt((T[:, :3, 3] ** 2).sum(axis=1))
         elif name == "height":
@@ -109,21 +110,6 @@ def readings_of(robot: Robot, combinations: list[tuple[str, str | None]], seed: 
     )  # fmt: skip
 
 
-def quaternion(R: Array) -> Array:
-    """Return (w, x, y, z) of a rotation as the eigenvector that all of it turns by (Bar-Itzhack 2000)."""
-    (a, b, c), (d, e, f), (g, h, i) = R
-    K = np.array(
-        [
-            [a - e - i, d + b, g + c, h - f],
-            [d + b, e - a - i, h + f, c - g],
-            [g + c, h + f, i - a - e, d - b],
-            [h - f, c - g, d - b, a + e + i],
-        ]
-    )
-    x, y, z, w = np.linalg.eigh(K)[1][:, -1]
-    return np.array([w, x, y, z])
-
-
 def problem_of(robot: Robot, data: Dataset) -> Problem:
     """Return the problem with everything free that can be."""
     return Problem(robot, data, FreeParameters(tuple(robot.parameters.values())), SIGMA, priors=False)
@@ -136,43 +122,42 @@ def away(problem: Problem, trials: int, seed: int = 5) -> Array:
     return free.start + size * np.random.default_rng(seed).standard_normal((trials, len(size)))
 
 
-def test_every_observation_is_looked_at() -> None:
+def every_problem() -> Iterator[tuple[str, str | None, str, Problem]]:
+    """Give the problem of each observation from each fixture, of a rigid arm and one with effects."""
     assert {o.name for o in OBSERVATIONS} == set(FROM)
+    for effects in EFFECTS:
+        robot = robot_with(effects)
+        for name, fixture in COMBINATIONS:
+            yield name, fixture, effects, problem_of(robot, readings_of(robot, [(name, fixture)]))
 
 
-@pytest.mark.parametrize("effects", EFFECTS)
-@pytest.mark.parametrize(("name", "fixture"), COMBINATIONS)
-def test_predicts_what_the_twin_shows(name: str, fixture: str | None, effects: str) -> None:
-    robot = robot_with(effects)
-    problem = problem_of(robot, readings_of(robot, [(name, fixture)]))
-    assert {block.observation.name for block in problem.blocks} == {name}
-    assert {block.fixture for block in problem.blocks} == {fixture}
-    assert problem.rows == (1 if name == "orientation" else 2) * COUNT * problem.blocks[0].observation.components
-    # loads of the robot are found to 1e-9 rad; without effects everything is rounding
-    small = 1e-13 if effects == "rigid" else 2e-9
-    residual = problem.residual(problem.free.start) * SIGMA[name]
-    assert np.abs(residual).max() < small
+def test_predicts_what_the_twin_shows() -> None:
+    for name, fixture, effects, problem in every_problem():
+        assert {(block.observation.name, block.fixture) for block in problem.blocks} == {(name, fixture)}
+        components = problem.blocks[0].observation.components
+        assert problem.rows == (1 if name == "orientation" else 2) * COUNT * components
+        # loads of the robot are found to 1e-9 rad; without effects everything is rounding
+        small = 1e-13 if effects == "rigid" else 2e-9
+        residual = problem.residual(problem.free.start) * SIGMA[name]
+        assert np.abs(residual).max() < small, (name, fixture, effects)
 
 
-@pytest.mark.parametrize("effects", EFFECTS)
-@pytest.mark.parametrize(("name", "fixture"), COMBINATIONS)
-def test_jacobian_by_central_differences(name: str, fixture: str | None, effects: str) -> None:
-    robot = robot_with(effects)
-    problem = problem_of(robot, readings_of(robot, [(name, fixture)]))
-    x = away(problem, 1)[0]
-    free, sigma = problem.free, SIGMA[name]
-    J = problem.linearised(x)[1] * sigma
-    groups = {p.group for p, column in zip(free.parameters, J.T, strict=True) if column.any()}
-    assert {"base", "joint zero", "geometry", "target"} <= groups
-    assert ("fixture" in groups) == (fixture is not None)
-    for i, p in enumerate(free.parameters):
-        h = {"m": 1e-4, "rad": 1e-4, "1": 1e-4}.get(p.unit, 1e-7)
-        e = h * (np.arange(len(x)) == i)
-        # Richardson: the error of the plain difference is h^2, that of this h^4
-        near = (problem.residual(x + e / 2) - problem.residual(x - e / 2)) / h
-        far = (problem.residual(x + e) - problem.residual(x - e)) / (2 * h)
-        difference = (4 * near - far) / 3 * sigma
-        np.testing.assert_allclose(J[:, i], difference, rtol=2e-8, atol=2e-9 * max(1.0, 1e-5 / h), err_msg=p.name)
+def test_jacobian_by_central_differences() -> None:
+    for name, fixture, effects, problem in every_problem():
+        x = away(problem, 1)[0]
+        free, sigma = problem.free, SIGMA[name]
+        J = problem.linearised(x)[1] * sigma
+        groups = {p.group for p, column in zip(free.parameters, J.T, strict=True) if column.any()}
+        assert {"base", "joint zero", "geometry", "target"} <= groups
+        assert ("fixture" in groups) == (fixture is not None)
+        for i, p in enumerate(free.parameters):
+            h = {"m": 1e-4, "rad": 1e-4, "1": 1e-4}.get(p.unit, 1e-7)
+            e = h * (np.arange(len(x)) == i)
+            # Richardson: the error of the plain difference is h^2, that of this h^4
+            near = (problem.residual(x + e / 2) - problem.residual(x - e / 2)) / h
+            far = (problem.residual(x + e) - problem.residual(x - e)) / (2 * h)
+            difference, case = (4 * near - far) / 3 * sigma, f"{name} from {fixture}, {effects}: {p.name}"
+            np.testing.assert_allclose(J[:, i], difference, rtol=2e-8, atol=2e-9 * max(1.0, 1e-5 / h), err_msg=case)
 
 
 def with_setup(robot: Robot, data: Dataset) -> Dataset:
@@ -197,32 +182,21 @@ def with_setup(robot: Robot, data: Dataset) -> Dataset:
     return replace(data, fixtures=fixtures, setup=known)
 
 
-@pytest.mark.parametrize("effects", EFFECTS)
-def test_many_trials_at_once_are_each_alone(effects: str) -> None:
-    robot = robot_with(effects)
-    problem = problem_of(robot, with_setup(robot, readings_of(robot, COMBINATIONS)))
-    trials = away(problem, 4)
-    together = problem.at(trials)
-    residual, jacobian = together.residual, together.jacobian
-    assert jacobian.shape == (4, problem.rows, len(problem.free.names))
-    for k, vector in enumerate(trials):
-        alone = problem.at(vector)
-        np.testing.assert_allclose(residual[k], alone.residual, rtol=1e-12, atol=1e-8)
-        np.testing.assert_allclose(jacobian[k], alone.jacobian, rtol=1e-10, atol=1e-6)
-
-
-@pytest.mark.parametrize("group", ["base", "target", "fixture"])
-def test_trials_of_one_kind_of_parameter_alone(group: str) -> None:
-    robot = robot_with("rigid")
-    data = with_setup(robot, readings_of(robot, COMBINATIONS))
-    free = FreeParameters(tuple(p for p in robot.parameters.values() if p.group == group))
-    problem = Problem(robot, data, free, SIGMA, priors=False)
-    trials = away(problem, 4)
-    together = problem.at(trials)
-    for k, vector in enumerate(trials):
-        alone = problem.at(vector)
-        np.testing.assert_allclose(together.residual[k], alone.residual, rtol=1e-12, atol=1e-8)
-        np.testing.assert_allclose(together.jacobian[k], alone.jacobian, rtol=1e-10, atol=1e-6)
+def test_many_trials_at_once_are_each_alone() -> None:
+    kinds = ("", "base", "target", "fixture")
+    for effects, chosen in (("effects", ""), *(("rigid", kind) for kind in kinds)):
+        robot = robot_with(effects)
+        data = with_setup(robot, readings_of(robot, COMBINATIONS))
+        free = FreeParameters(tuple(p for p in robot.parameters.values() if chosen in ("", p.group)))
+        problem = Problem(robot, data, free, SIGMA, priors=False)
+        trials = away(problem, 4)
+        together = problem.at(trials)
+        residual, jacobian = together.residual, together.jacobian
+        assert jacobian.shape == (4, problem.rows, len(free.names))
+        for k, vector in enumerate(trials):
+            alone = problem.at(vector)
+            np.testing.assert_allclose(residual[k], alone.residual, rtol=1e-12, atol=1e-8, err_msg=chosen)
+            np.testing.assert_allclose(jacobian[k], alone.jacobian, rtol=1e-10, atol=1e-6, err_msg=chosen)
 
 
 def test_what_is_known_of_fixtures_is_rows_of_their_own() -> None:
@@ -258,10 +232,9 @@ def test_readings_declare_their_own_deviations_and_the_setup_its_own() -> None:
 
 def test_an_unknown_fixture_is_refused() -> None:
     robot = robot_with("rigid")
-    data = readings_of(robot, [("distance", "point")])
-    bare = robot.with_fixtures({})
-    with pytest.raises(InputError, match=r"no fixture of this name; got 'point'"):
-        problem_of(bare, data).residual(problem_of(bare, data).free.start)
+    problem = problem_of(robot.with_fixtures({}), readings_of(robot, [("distance", "point")]))
+    with refused("no fixture of this name; got 'point'"):
+        problem.residual(problem.free.start)
 
 
 def test_a_target_at_the_very_point_moves_no_distance_and_makes_no_fuss() -> None:

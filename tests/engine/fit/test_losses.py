@@ -1,7 +1,8 @@
-"""Losses on readings of one number and of three together, and what they do to lengths caught by mistake."""
+"""Losses on readings of one number and of three, lengths caught by mistake, and the sum of absolute components."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
 
@@ -12,12 +13,19 @@ from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.fit.fit import Fit, Status, identify
 from truearm.engine.fit.losses import Loss, norms_of, robust_scale, weights
 from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.solver import least_absolute, solve
 from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parameters import FreeParameters
+from truearm.engine.robot.robot import Robot
+from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.twin.devices import named_device
 from truearm.engine.twin.devices.device import measured_with
 from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import Twin, measure
 
 GEOMETRIC = {m.name: m for m in MODELS}["geometric"]
+ROBUST: tuple[Loss, ...] = ("huber", "cauchy", "l1")
 
 
 def test_norms_are_of_whole_readings() -> None:
@@ -27,28 +35,23 @@ def test_norms_are_of_whole_readings() -> None:
     assert norms == pytest.approx([5.0, 2.0 * 2.7955 / 1.96, 3.0, 0.5 * 2.7955 / 1.96])
 
 
-@pytest.mark.parametrize("components", [1, 3])
-def test_the_deviation_of_a_coordinate_is_found_from_readings_of_either_kind(components: int) -> None:
+def test_the_deviation_of_a_coordinate_is_found_from_readings_of_either_kind_and_of_both() -> None:
     rng = np.random.default_rng(0)
     residual = 0.7 * rng.standard_normal(30_000)
-    every = np.full(30_000 // components, components)
-    norms = norms_of(residual, every)
-    assert robust_scale(norms, every) == pytest.approx(0.7, rel=0.02)
-    assert np.quantile(norms, 0.95) == pytest.approx(0.7 * 2.7955, rel=0.02)
+    for components in (1, 3):
+        every = np.full(30_000 // components, components)
+        norms = norms_of(residual, every)
+        assert robust_scale(norms, every) == pytest.approx(0.7, rel=0.02), components
+        assert np.quantile(norms, 0.95) == pytest.approx(0.7 * 2.7955, rel=0.02), components
+    both = np.tile([1, 3], 7500)
+    assert robust_scale(norms_of(residual, both), both) == pytest.approx(0.7, rel=0.02)
 
 
-def test_the_deviation_is_found_from_both_kinds_together() -> None:
-    components = np.tile([1, 3], 10_000)
-    residual = np.random.default_rng(1).standard_normal(int(components.sum()))
-    assert robust_scale(norms_of(residual, components), components) == pytest.approx(1.0, rel=0.02)
-
-
-@pytest.mark.parametrize("loss", ["huber", "cauchy", "l1"])
-def test_the_further_off_the_less_it_counts(loss: Loss) -> None:
-    norms = np.array([0.1, 1.0, 3.0, 10.0, 100.0])
-    found = weights(loss, norms, 1.0)
-    assert (np.diff(found) <= 0.0).all()
-    assert found[-1] < 0.05 * found[0]
+def test_the_further_off_the_less_it_counts() -> None:
+    for loss in ROBUST:
+        found = weights(loss, np.array([0.1, 1.0, 3.0, 10.0, 100.0]), 1.0)
+        assert (np.diff(found) <= 0.0).all(), loss
+        assert found[-1] < 0.05 * found[0], loss
 
 
 @cache
@@ -65,7 +68,7 @@ def lengths_of(device: str) -> tuple[Dataset, IntArray, Fit, Fit]:
     return caught, wrong, identify(nominal, data, GEOMETRIC), identify(nominal, caught, GEOMETRIC)
 
 
-@pytest.mark.parametrize("loss", ["huber", "cauchy", "l1"])
+@pytest.mark.parametrize("loss", ROBUST)
 @pytest.mark.parametrize("device", ["ballbar", "strings"])
 def test_lengths_caught_by_mistake_are_found(device: str, loss: Loss) -> None:
     data, wrong, clean, plain = lengths_of(device)
@@ -77,3 +80,67 @@ def test_lengths_caught_by_mistake_are_found(device: str, loss: Loss) -> None:
     q = load_robot("irb120").random_configurations(50, np.random.default_rng(8))
     by_clean, by_robust, by_plain = (fit.robot.world_poses(q)[0] for fit in (clean, robust, plain))
     assert np.abs(by_robust - by_clean).mean() < 0.3 * np.abs(by_plain - by_clean).mean()
+
+
+# -- the sum of absolute components
+
+
+def arm() -> Robot:
+    return load_robot("li3").with_frames(IDENTITY, {"tip": (0.0, 0.0, 0.0)})
+
+
+def problem_of(robot: Robot, data: Dataset, *names: str) -> Problem:
+    free = FreeParameters(tuple(robot.parameters[name] for name in names))
+    return Problem(robot, data, free, {"position": 1e-3}, priors=False)
+
+
+def read(robot: Robot, count: int, seed: int) -> Dataset:
+    rng = np.random.default_rng(seed)
+    return measure(Twin(robot), robot.random_configurations(count, rng), 0.0, rng)
+
+
+def test_a_shift_is_the_median_of_every_coordinate() -> None:
+    rng = np.random.default_rng(0)
+    data = read(arm(), 15, 0)
+    scatter = rng.standard_normal(data.position.shape) ** 3 * 1e-3
+    shifted = replace(data, position=data.position + scatter)
+    problem = problem_of(arm(), shifted, "base_x", "base_y", "base_z")
+    np.testing.assert_allclose(least_absolute(problem)[0].vector, np.median(scatter, axis=0), atol=1e-12)
+    assert np.abs(solve(problem, "l1").vector - np.median(scatter, axis=0)).max() > 1e-5  # distances: another answer
+
+
+def test_a_bound_holds_where_the_median_is_beyond_it() -> None:
+    data = read(arm(), 9, 1)
+    shifted = replace(data, position=data.position + np.array([3e-3, -1e-3, 0.5e-3]))
+    problem = problem_of(arm(), shifted, "base_x", "base_y", "base_z")
+    limits = (np.full(3, -2e-3), np.full(3, 2e-3))
+    np.testing.assert_allclose(least_absolute(problem, limits)[0].vector, [2e-3, -1e-3, 0.5e-3], atol=1e-12)
+
+
+def test_true_parameters_come_back_though_a_quarter_of_the_readings_is_mistaken() -> None:
+    names = ("theta_offset_1", "alpha_1", "theta_offset_2", "a_2", "theta_offset_3", "a_3")
+    rng = np.random.default_rng(2)
+    truth = {n: arm().values[n] + (0.05 if "theta" in n or "alpha" in n else 0.01) * rng.uniform(-1, 1) for n in names}
+    data = read(arm().with_values(truth), 24, 3)
+    position = data.position.copy()
+    position[::4] += rng.normal(0.0, 0.05, position[::4].shape)
+    problem = problem_of(arm(), replace(data, position=position), *names)
+    nominal = problem.free.nominal
+    for limits in (None, (nominal - 0.1, nominal + 0.1)):
+        np.testing.assert_allclose(least_absolute(problem, limits)[0].vector, list(truth.values()), atol=1e-9)
+    assert math.dist(solve(problem).vector, list(truth.values())) > 1e-3
+
+
+def test_each_sum_is_least_for_its_own_fit() -> None:
+    names = ("theta_offset_1", "theta_offset_2", "a_2", "theta_offset_3", "a_3")
+    data = read(arm(), 12, 4)
+    noisy = replace(data, position=data.position + np.random.default_rng(4).normal(0.0, 5e-3, data.position.shape))
+    problem = problem_of(arm(), noisy, *names)
+    limits = (problem.free.nominal - 2e-3, problem.free.nominal + 2e-3)
+    by_components, by_distances = least_absolute(problem, limits)[0].vector, solve(problem, "l1", limits).vector
+    residuals = [problem.residual(x).reshape(-1, 3) for x in (by_components, by_distances)]
+    components = [np.abs(r).sum() for r in residuals]
+    distances = [np.linalg.norm(r, axis=1).sum() for r in residuals]
+    assert components[0] < components[1]
+    assert distances[1] < distances[0]
+    assert (np.abs(by_components - problem.free.nominal) <= 2e-3 * (1 + 1e-12)).all()

@@ -33,34 +33,26 @@ def campaign(robot: Robot, gears: dict[int, tuple[int, float]], poses: int, seed
     return identify(robot.with_payload(twin.robot.payload), data, ELASTIC), data
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_gears_that_err_are_found(seed: int) -> None:
+def test_gears_that_err_are_found() -> None:
     gears = {2: (242, 6e-5), 3: (200, 1e-4), 5: (102, 2e-4)}
-    fit, data = campaign(unknown_gears(load_robot("irb120")), gears, 150, seed)
-    found = {error.joint: (error.periods, error.amplitude) for error in periodic_errors(fit, data)}
-    assert set(found) == set(gears)
-    for joint, (periods, size) in gears.items():
-        assert found[joint][0] == pytest.approx(periods, abs=1)
-        assert found[joint][1] == pytest.approx(size, rel=0.25)
-    (notice,) = check_transmission(fit, data)
-    assert notice.code == "transmission-error"
-    assert "joint 3 200 times" in notice.message
+    for seed in range(3):
+        fit, data = campaign(unknown_gears(load_robot("irb120")), gears, 150, seed)
+        found = {error.joint: (error.periods, error.amplitude) for error in periodic_errors(fit, data)}
+        assert set(found) == set(gears), seed
+        for joint, (periods, size) in gears.items():
+            assert found[joint][0] == pytest.approx(periods, abs=1)
+            assert found[joint][1] == pytest.approx(size, rel=0.25)
+        (notice,) = check_transmission(fit, data)
+        assert notice.code == "transmission-error"
+        assert "joint 3 200 times" in notice.message
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_perfect_gears_are_left_in_peace(seed: int) -> None:
-    fit, data = campaign(unknown_gears(load_robot("irb120")), {}, 100, seed)
-    assert check_transmission(fit, data) == []
-
-
-def test_a_gear_that_the_file_describes_is_not_told_again() -> None:
-    fit, data = campaign(load_robot("irb120"), {3: (200, 2e-4)}, 100, 1)
-    assert periodic_errors(fit, data) == ()
-
-
-def test_few_configurations_say_nothing() -> None:
-    fit, data = campaign(unknown_gears(load_robot("irb120")), {3: (200, 2e-3)}, 40, 2)
-    assert periodic_errors(fit, data) == ()
+def test_what_is_no_error_of_a_gear_or_said_already_is_left_in_peace() -> None:
+    for seed in range(8):
+        assert check_transmission(*campaign(unknown_gears(load_robot("irb120")), {}, 100, seed)) == [], seed
+    assert periodic_errors(*campaign(load_robot("irb120"), {3: (200, 2e-4)}, 100, 1)) == ()  # its file describes it
+    few = campaign(unknown_gears(load_robot("irb120")), {3: (200, 2e-3)}, 40, 2)
+    assert periodic_errors(*few) == ()
 
 
 def test_the_effect_takes_the_error_out() -> None:
@@ -103,23 +95,16 @@ def test_a_joint_whose_axis_passes_the_only_target_is_not_named() -> None:
     assert error.amplitude == pytest.approx(5e-5 / 0.2, rel=0.25)
 
 
-@pytest.mark.parametrize("span", [1e-4, 1e-3, 2e-2])
-def test_a_joint_that_hardly_turns_is_not_named(span: float) -> None:
-    # What grows with the cube of the joint's small turns is the slope of any slow sine.
+def test_a_joint_that_hardly_turns_or_stands_still_is_not_named() -> None:
     plain = unknown_gears(load_robot("irb120"))
     robot = plain.with_frames(plain.base, {"tip": (0.1, 0.05, 0.1)})
-    rng = np.random.default_rng(0)
-    joints = robot.random_configurations(150, rng)
-    joints[:, 3] = rng.uniform(-span, span, 150)
-    fit, data = moved_by_a_joint(robot, joints, 3, 5e-5 * (joints[:, 3] / span) ** 3)
-    assert periodic_errors(fit, data) == ()
-
-
-def test_a_joint_that_stands_still_is_not_named() -> None:
-    plain = unknown_gears(load_robot("irb120"))
-    robot = plain.with_frames(plain.base, {"tip": (0.1, 0.05, 0.1)})
-    rng = np.random.default_rng(0)
-    joints = robot.random_configurations(150, rng)
+    for span in (1e-4, 1e-3, 2e-2):
+        rng = np.random.default_rng(0)
+        joints = robot.random_configurations(150, rng)
+        joints[:, 3] = rng.uniform(-span, span, 150)
+        # What grows with the cube of the joint's small turns is the slope of any slow sine.
+        fit, data = moved_by_a_joint(robot, joints, 3, 5e-5 * (joints[:, 3] / span) ** 3)
+        assert periodic_errors(fit, data) == (), span
     joints[:, 3] = 0.3
     fit, data = moved_by_a_joint(robot, joints, 3, 3e-5 * rng.normal(size=150))
     assert 4 not in [error.joint for error in periodic_errors(fit, data)]

@@ -18,8 +18,7 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import rigid_motion
 from truearm.engine.twin.devices import named_device
-from truearm.engine.twin.devices.device import Arm, in_view_of, measured_with
-from truearm.engine.twin.devices.touching import TwoSockets
+from truearm.engine.twin.devices.device import Arm, in_view_of
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin
 from truearm.engine.twin.twin_joint import JointTruth
@@ -106,17 +105,3 @@ def test_a_size_that_no_reading_holds_does_not_explain_what_a_fit_leaves() -> No
     left = LeftOver.of(identify(NOMINAL, data, named_model("geometric")), data)
     rest = left.without_parameters(left.residual)
     assert float(rest @ rest) > 0.5 * float(left.residual @ left.residual)
-
-
-def test_the_device_puts_the_ball_into_both_sockets_from_above() -> None:
-    twin = truth_twin(NOMINAL, "nominal", np.random.default_rng(0))
-    data = measured_with(DEVICE, NOMINAL, twin, 20, np.random.default_rng(1), 0.0)
-    seen = twin.robot.with_frames(twin.robot.base, {"ball": (0.02, 0.01, 0.15)})
-    places, turned = seen.world_poses(data.joints, "ball")
-    for socket in (0, 1):
-        assert np.ptp(places[data.against == socket], axis=0).max() < 1e-8
-    assert isinstance(DEVICE, TwoSockets)
-    apart = np.linalg.norm(places[data.against == 0][0] - places[data.against == 1][0])
-    assert apart == pytest.approx(DEVICE.apart, abs=1e-8)
-    assert (seen.world_poses(data.joints)[1][:, :, 2] @ -seen.base.rotation[:, 2]).min() > np.cos(DEVICE.within + 1e-9)
-    assert turned.shape == (20, 3, 3)

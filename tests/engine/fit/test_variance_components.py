@@ -1,13 +1,30 @@
+"""Errors of joints that readings share, by closed forms, and fits in portions."""
+
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.special import stdtrit
+from tests.engine.fit.test_two_sockets import NOMINAL
+from tests.engine.fit.test_two_sockets import campaign as two_sockets
+from tests.simulated import campaign
 
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.fit import likelihood, problem
+from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.likelihood import Arrivals, Likelihood, Linearised, Moments, Whitening
 from truearm.engine.fit.losses import Loss, pulls
+from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.solver import solve
 from truearm.engine.fit.variance_components import Components, cluster_covariance, variance_components
 from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
 
 ARRIVALS, READINGS = 12, 5
 
@@ -133,19 +150,92 @@ def test_scatter_of_equal_arrivals_is_that_of_their_means() -> None:
     assert parts[0].freedom == pytest.approx(ARRIVALS - 1, rel=1e-6)
 
 
-@pytest.mark.parametrize("loss", ["huber", "cauchy", "l1"])
-def test_pulls_follow_the_parameters_as_their_root_says(loss: Loss) -> None:
+def test_pulls_follow_the_parameters_as_their_root_says() -> None:
     rng = np.random.default_rng(6)
     components_of = np.full(200, 3)
     jacobian = rng.standard_normal((600, 2))
     residual = rng.standard_normal(600) * np.repeat(1.0 + 8.0 * (rng.random(200) < 0.1), 3)
-    _, root = pulls(loss, residual, jacobian, components_of)
-    step = 1e-4
-    moved = []
-    for k in range(2):
-        after, before = (
-            pulls(loss, residual + side * step * jacobian[:, k], jacobian, components_of)[0].sum(axis=0)
-            for side in (1, -1)
-        )
-        moved.append((after - before) / (2 * step))
-    np.testing.assert_allclose(root.T @ root, np.array(moved), rtol=0.05, atol=0.02 * np.abs(moved).max())
+    robust: tuple[Loss, ...] = ("huber", "cauchy", "l1")
+    for loss in robust:
+        _, root = pulls(loss, residual, jacobian, components_of)
+        moved = []
+        for way in 1e-4 * jacobian.T:
+            after, before = (pulls(loss, r, jacobian, components_of)[0] for r in (residual + way, residual - way))
+            moved.append((after - before).sum(axis=0) / 2e-4)
+        size = np.abs(moved).max()
+        np.testing.assert_allclose(root.T @ root, np.array(moved), rtol=0.05, atol=0.02 * size, err_msg=loss)
+
+
+# -- derivatives in portions of whole configurations: results are those of one portion
+
+MODEL = {model.name: model for model in MODELS}
+IRB120 = load_robot("irb120")
+
+
+def readings(configurations: int = 24) -> Dataset:
+    """Return readings of three targets whose arrivals share errors of the joints."""
+    rng = np.random.default_rng(5)
+    twin = truth_twin(IRB120, "tracker-triangular", rng)
+    q = IRB120.random_configurations(configurations, rng)
+    read = measure(twin, q + 1e-4 * rng.standard_normal(q.shape), 3e-5, rng)
+    return replace(read, joints=q, sigma=None)
+
+
+def same_fit(one: Fit, other: Fit) -> None:
+    assert one.status == other.status
+    assert_allclose([*other.robot.values.values()], [*one.robot.values.values()], rtol=1e-9, atol=1e-12)
+    size = np.sqrt(np.diag(one.covariance))
+    assert_allclose(other.covariance, one.covariance, rtol=0.0, atol=1e-9 * np.outer(size, size).max())
+    assert_allclose(other.joint_error, one.joint_error, rtol=1e-9)
+    assert other.sigma == pytest.approx(one.sigma, rel=1e-9)
+
+
+def test_a_fit_in_portions_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = readings()
+    whole = {name: identify(IRB120, data, MODEL[name]) for name in ("geometric", "elastic")}
+    monkeypatch.setattr(problem, "_AT_ONCE", 3000)
+    for kept in (True, False):
+        if not kept:
+            monkeypatch.setattr(likelihood, "_KEPT", 0)
+            monkeypatch.setattr(likelihood, "_AT_ONCE", 1000)
+        for name, one in whole.items():
+            assert one.joint_error.any()
+            same_fit(one, identify(IRB120, data, MODEL[name]))
+
+
+def test_what_is_known_of_fixtures_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = two_sockets(2, 2e-5, 0.0, 60)[1]
+    assert data.setup is not None
+    one = identify(NOMINAL, data, MODEL["geometric"])
+    monkeypatch.setattr(problem, "_AT_ONCE", 2000)
+    same_fit(one, identify(NOMINAL, data, MODEL["geometric"]))
+
+
+def test_portions_hold_every_equation_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = readings()
+    drawn = data.of_readings(np.flatnonzero(np.random.default_rng(0).random(len(data.target)) < 0.7))
+    robot = truth_twin(IRB120, "tracker-triangular", np.random.default_rng(5)).robot
+    noise = {"position": 1e-4}
+    whole = Problem(robot, drawn, MODEL["geometric"].free(robot), noise)
+    here = whole.at(whole.free.start)
+    r, J, G = here.residual, here.jacobian, here.by_joints
+    monkeypatch.setattr(problem, "_AT_ONCE", 2000)
+    parted = replace(whole).at(whole.free.start)
+    parts = [*parted.portions()]
+    assert len(parts) > 3
+    assert sorted(np.concatenate([rows for rows, _ in parts]).tolist()) == list(range(whole.rows))
+    for rows, part in parts:
+        assert_allclose(part.jacobian, J[rows], rtol=1e-12, atol=1e-9)
+    assert_allclose(parted.residual, r, rtol=1e-12)
+    assert_allclose(parted.by_joints, G, rtol=1e-12, atol=1e-9)
+    assert_allclose(parted.triangle.T @ parted.triangle, J.T @ J, rtol=1e-9, atol=1e-3)
+
+
+def test_a_step_that_is_left_out_would_have_moved_nothing() -> None:
+    twin, data = campaign("irb120", 24, 3e-5, 1, "tracker-triangular")
+    robot = twin.robot
+    problem_ = Problem(robot, data, MODEL["geometric"].free(robot), {"position": 3e-5})
+    quick, far = solve(problem_), solve(problem_, small=1e-12)
+    assert quick.converged
+    assert quick.steps < far.steps
+    assert np.abs((quick.vector - far.vector) / problem_.free.prior).max() < 1e-7

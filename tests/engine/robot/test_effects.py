@@ -5,22 +5,28 @@ from __future__ import annotations
 import ast
 import re
 import runpy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import brentq
+from tests.engine.robot.refusing import refused
 
 import truearm
-from truearm.engine.base.errors import InputError
 from truearm.engine.robot.balancers import Anchor, Balancer
 from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
 from truearm.engine.robot.effects.backlash import SEATED
-from truearm.engine.robot.effects.effect import Effect
+from truearm.engine.robot.effects.effect import Effect, LinearEffect
+from truearm.engine.robot.effects.joint_curve import HIGHEST, JointCurve, curve_names, curve_waves
+from truearm.engine.robot.inverse.kinematics import inverse
 from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.loads import joint_loads
 from truearm.engine.robot.parts import LinkMass, Payload
 from truearm.engine.robot.postures import Postures, approach_of
 from truearm.engine.robot.robot import Robot
@@ -90,59 +96,38 @@ def test_derivatives_are_central_differences_under_load(effect: type[Effect]) ->
     robot = loaded_arm((effect.name,), 3)
     at = robot.loaded(circumstances(robot, 40, 4))
     names = [p.name for e in robot.effects for p in e.parameters]
-    linear, angular = robot.jacobians(robot.forward_kinematics(at, "tip"), at, names)
+    here = robot.forward_kinematics(at, "tip")
+    linear, angular = robot.jacobians(here, at, names)
     for i, name in enumerate(names):
         h = 1e-3 * robot.parameters[name].prior
-        ahead, behind = (
-            robot.forward_kinematics(at, "tip", {**robot.values, name: robot.values[name] + s * h}) for s in (1, -1)
-        )
-        expected = (ahead.position - behind.position) / (2 * h)
-        scale = np.abs(linear[i]).max()
-        assert_allclose(linear[i], expected, rtol=0, atol=1e-6 * scale + 1e-13 / h, err_msg=name)
-        turned = (
-            (ahead.matrix() - behind.matrix())
-            @ np.swapaxes(robot.forward_kinematics(at, "tip").matrix(), 1, 2)
-            / (2 * h)
-        )
+        values = ({**robot.values, name: robot.values[name] + step} for step in (h, -h))
+        ahead, behind = (robot.forward_kinematics(at, "tip", trial) for trial in values)
+        turned = (ahead.matrix() - behind.matrix()) @ np.swapaxes(here.matrix(), 1, 2)
         vee = np.stack([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]])
-        assert_allclose(angular[i], vee, rtol=0, atol=1e-6 * np.abs(angular[i]).max() + 1e-13 / h, err_msg=name)
+        for own, moved in ((linear[i], ahead.position - behind.position), (angular[i], vee)):
+            atol = 1e-6 * np.abs(own).max() + 1e-13 / h
+            assert_allclose(own, moved / (2 * h), rtol=0, atol=atol, err_msg=name)
     assert np.abs(linear).max() > 0
 
 
 @pytest.mark.parametrize("effects", [(effect.name,) for effect in EFFECTS] + [NAMES])
 def test_effects_that_are_off_change_nothing_at_all(effects: tuple[str, ...]) -> None:
-    plain = replace(load_robot("irb120"), payload=Payload(2.0, (0.05, 0.03, 0.1)))
+    plain = replace(load_robot("irb120"), payload=Payload(2.0, (0.05, 0.03, 0.1)), balancers=(SPRING,))
     robot = plain.with_effects(effects)
+    assert set(robot.parameters) > set(plain.parameters)
     at = circumstances(robot, 20, 5)
     for actual, expected in zip(robot.world_poses(at), plain.world_poses(at), strict=True):
         assert_array_equal(actual, expected)
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
-@pytest.mark.parametrize("massless", [True, False])
-def test_nothing_is_nan_where_a_moment_is_zero(effect: type[Effect], massless: bool) -> None:
-    robot = loaded_arm((effect.name,), 6)
-    if massless:
-        robot = replace(robot, masses=(), payload=Payload())
+def test_nothing_is_nan_where_a_moment_is_zero(effect: type[Effect]) -> None:
+    laden = loaded_arm((effect.name,), 6)
     straight_up = np.zeros((1, 6))  # no moment about joint 1, nearly none about the others
-    kinematics = robot.forward_kinematics(straight_up, "tip")
-    linear, angular = robot.jacobians(kinematics, straight_up, list(robot.parameters))
-    assert np.isfinite(kinematics.position).all()
-    assert np.isfinite(linear).all()
-    assert np.isfinite(angular).all()
-
-
-def test_a_horizontal_arm_sags() -> None:
-    arm = replace(load_robot("irb120"), payload=Payload(3.0)).with_effects(["compliance"])
-    stretched = np.radians([[0, 90, -90, 0, 0, 0.0]])
-    rigid = arm.world_poses(stretched)[0][0]
-    for joint in (2, 3, 5):
-        bent = arm.with_values({f"compliance_{joint}": 1e-4}).world_poses(stretched)[0][0]
-        assert bent[2] < rigid[2] - 1e-5
-    hanging = (
-        arm.with_payload(gravity=(0.0, 0.0, 9.81)).with_values({"compliance_2": 1e-4}).world_poses(stretched)[0][0]
-    )
-    assert hanging[2] > rigid[2] + 1e-5
+    for robot in (laden, replace(laden, masses=(), payload=Payload())):
+        kinematics = robot.forward_kinematics(straight_up, "tip")
+        for found in (kinematics.position, *robot.jacobians(kinematics, straight_up, list(robot.parameters))):
+            assert np.isfinite(found).all()
 
 
 def test_approach_follows_the_numbers_of_the_configurations() -> None:
@@ -175,21 +160,76 @@ def test_what_is_not_known_does_nothing(effect: str) -> None:
         assert_array_equal(actual, expected)
 
 
+# -- where loads and deflections depend on each other
+
+
+@pytest.mark.parametrize("effects", [*((effect.name,) for effect in EFFECTS), NAMES], ids="+".join)
+def test_readings_are_those_that_the_variables_came_from(effects: tuple[str, ...]) -> None:
+    for name in ("irb120", "katana450"):
+        rng = np.random.default_rng(1)
+        plain = replace(load_robot(name), payload=Payload(2.0, (0.05, 0.03, 0.1))).with_effects(effects)
+        own = [p for effect in plain.effects for p in effect.parameters]
+        robot = plain.with_values({p.name: p.nominal + 0.3 * p.prior * rng.standard_normal() for p in own})
+        q = robot.random_configurations(200, rng)
+        variables = robot.variables(q, robot.values)
+        assert len(variables) == len(robot.moving)
+        assert_allclose(robot.joints_of(variables), q, rtol=0, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_equilibrium_in_the_play_of_a_joint_is_a_root_of_its_equation(up: float) -> None:
+    """An arm whose second joint has play carries a weight that balances at `up` = 1, and hangs at -1.
+
+    The moment of the weight is m g l sin(v), about an axis that no other deflection moves.
+    """
+    plain = replace(load_robot("irb120"), masses=(LinkMass(2, 4.0, (0.3 * up, 0.0, 0.0)),)).with_effects(["backlash"])
+    stiffness = up * 4.0 * 0.3 * -plain.gravity[2]
+    q = np.linspace(-0.02, 0.02, 41)[:, None] * np.eye(6)[1]
+    for play in (1e-3, 8e-3, 2e-2):
+        robot = plain.with_values({"backlash_2": play})
+
+        def sideways(v: float, reading: float, play: float = play) -> float:
+            return float(v - reading - 0.5 * play * np.tanh(stiffness * np.sin(v) / SEATED))
+
+        variables = robot.variables(q, robot.values)
+        loads = joint_loads(robot, variables)
+        assert (np.abs(loads[1, 5]) < SEATED).any()
+        assert_allclose(loads[1, 5], stiffness * np.sin(variables[1]), rtol=0, atol=1e-12)
+        if up < 0.0:
+            roots = [brentq(sideways, -0.1, 0.1, args=(reading,), xtol=1e-15) for reading in q[:, 1]]
+            assert_allclose(variables[1], roots, rtol=0, atol=5e-12)
+        else:  # above its axis a weight may balance on either side of the play: any root will do
+            left = [sideways(*pair) for pair in zip(variables[1], q[:, 1], strict=True)]
+            assert_allclose(left, 0.0, rtol=0, atol=5e-12)
+        assert_allclose(robot.joints_of(variables), q, rtol=0, atol=5e-12)
+
+
+def test_tilts_under_their_own_loads_are_those_of_the_variables() -> None:
+    robot = loaded_arm(("compliance", "bearing-compliance", "clearance"), 3)
+    variables = robot.variables(robot.random_configurations(100, np.random.default_rng(4)), robot.values)
+    assert np.abs(variables[6:18]).max() > 1e-5
+    assert_allclose(robot.tilted(variables), variables, rtol=0, atol=1e-11)
+
+
+def test_variables_of_another_number_are_refused() -> None:
+    robot = load_robot("irb120").with_effects(["bearing-compliance"])
+    for variables in (np.zeros((6, 5)), np.zeros(23)):
+        with refused("wrong number of variables", "allowed: (23, n)"):
+            robot.joints_of(variables)
+
+
 # -- what an effect says about itself
 
 
+def test_names_are_unlike() -> None:
+    assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)
+
+
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
-def test_the_group_of_its_parameters_is_its_name(effect: type[Effect]) -> None:
+def test_it_depends_on_moves_and_is_called_what_it_says(effect: type[Effect]) -> None:
     robot = loaded_arm((effect.name,), 3)
     own = next(each for each in robot.effects if each.name == effect.name)
-    assert own.parameters
     assert {p.group for p in own.parameters if p.group != "session"} == {effect.name}
-    assert len({e.name for e in EFFECTS}) == len(EFFECTS)
-
-
-@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
-def test_it_depends_on_what_it_says(effect: type[Effect]) -> None:
-    robot = loaded_arm((effect.name,), 3)
     at = circumstances(robot, 40, 4)
     assert at.wrench is not None
     assert at.approach is not None
@@ -204,12 +244,8 @@ def test_it_depends_on_what_it_says(effect: type[Effect]) -> None:
     assert matters(approach=-at.approach, number=at.number[::-1]) == effect.ordered
     assert matters(temperature=at.temperature + 5.0) == effect.warmed
 
-
-@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
-def test_it_moves_what_it_says(effect: type[Effect]) -> None:
-    robot = loaded_arm((effect.name,), 3)
-    at = robot.loaded(circumstances(robot, 20, 4))
-    moved = {variable for rate in robot.effects[0].derivative(at, robot.values).values() for variable in rate}
+    rates = robot.effects[0].derivative(robot.loaded(at), robot.values).values()
+    moved = {variable for rate in rates for variable in rate}
     layout = robot.layout
     tilts = {variable for joint in layout.joints for variable in layout.tilt(joint)}
     lengths = {layout.length(number) for number in range(len(layout.lengths))}
@@ -221,16 +257,16 @@ def test_it_moves_what_it_says(effect: type[Effect]) -> None:
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_only_what_can_be_negative_may_be_stated_so(effect: type[Effect], tmp_path: Path) -> None:
     robot = replace(loaded_arm((effect.name,), 3), history=())
-    name = robot.effects[0].parameters[0].name
-    (tmp_path / "robot.yaml").write_text(robot_text(robot.with_values({name: -1e-5})))
+    own = robot.effects[0].parameters[0]
     assert (effect.name in NON_NEGATIVE) == effect.non_negative
-    if effect.non_negative:
-        with pytest.raises(
-            InputError, match=rf"{name}\.value: no joint has a negative one; got '-.*; allowed: 0 or more"
-        ):
-            read_robot(tmp_path / "robot.yaml")
-    else:
-        assert read_robot(tmp_path / "robot.yaml").values[name] == pytest.approx(-1e-5)
+    for field in ("nominal", "value"):
+        negative = replace(robot.parameters[own.name], **{field: -1e-5})  # type: ignore[arg-type]
+        (tmp_path / "robot.yaml").write_text(robot_text(robot.with_parameters([negative])))
+        if effect.non_negative:
+            with refused(f"{own.name}.{field}: no joint has a negative one", "allowed: 0 or more"):
+                read_robot(tmp_path / "robot.yaml")
+        else:
+            assert getattr(read_robot(tmp_path / "robot.yaml").parameters[own.name], field) == pytest.approx(-1e-5)
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
@@ -284,6 +320,7 @@ def spelled_lists(source: str, names: frozenset[str]) -> Iterator[int]:
 
 def test_no_other_module_lists_effects() -> None:
     names = frozenset(effect.name for effect in EFFECTS)
+    assert list(spelled_lists('x = ("gain", 1)\ny = {"gain": "backlash"}\nz = ["other"]\n', names)) == [1, 2]
     package = Path(truearm.__file__).parent
     found = [
         f"{'.'.join(path.relative_to(package.parent).with_suffix('').parts)}.{line}"
@@ -296,6 +333,142 @@ def test_no_other_module_lists_effects() -> None:
         assert any(place.startswith(f"{allowed}.") for place in found), f"{allowed} needs no exception any more"
 
 
-def test_the_scan_finds_a_list() -> None:
-    names = frozenset(effect.name for effect in EFFECTS)
-    assert list(spelled_lists('x = ("gain", 1)\ny = {"gain": "backlash"}\nz = ["other"]\n', names)) == [1, 2]
+# -- the curve of a joint: its waves, its sum, its lines in a robot file, and its inverse
+
+
+def curved(seed: int, size: float = 1e-4, joints: tuple[int, ...] = (1, 2, 5)) -> Robot:
+    rng = np.random.default_rng(seed)
+    robot = load_robot("irb120").with_effects(["joint-curve"])
+    names = [name for number in joints for name in curve_names(number)]
+    return robot.with_parameters(
+        replace(
+            robot.parameters[name],
+            value=size * rng.normal() / (1 + n // 2),
+            prior=float(rng.uniform(1e-6, 1e-4)),
+            deviation=float(rng.uniform(1e-7, 1e-5)),
+            informed=float(rng.uniform()),
+        )
+        for n, name in enumerate(names)
+    )
+
+
+@given(st.floats(-50.0, 50.0), st.integers(1, 200))
+def test_waves_are_sines_and_cosines(angle: float, highest: int) -> None:
+    waves = curve_waves(np.array([angle]), highest)[:, 0]
+    k = np.arange(1, highest + 1)
+    assert_allclose(waves[0::2], np.sin(k * angle), atol=1e-12 + 1e-16 * highest * abs(angle) * 8)
+    assert_allclose(waves[1::2], np.cos(k * angle), atol=1e-12 + 1e-16 * highest * abs(angle) * 8)
+
+
+def test_the_sum_is_that_of_parameters_times_shapes() -> None:
+    robot, rng = curved(1), np.random.default_rng(2)
+    effect = robot.effects[0]
+    assert isinstance(effect, JointCurve)
+    for count in (0, 1, 7, 5000):
+        at = Postures(robot.random_configurations(count, rng))
+        plain = LinearEffect.deflection(effect, at, robot.values)
+        for joint, part in effect.deflection(at, robot.values).items():
+            assert part.shape == (count,)
+            assert_allclose(part, plain[joint], rtol=0, atol=1e-17 * 120 + 1e-15)
+    trials = {name: value * rng.normal(size=(3, 1)) for name, value in robot.values.items()}
+    moved = effect.deflection(at, trials)
+    assert sorted(moved) == [0, 1, 4]
+    for number in range(3):
+        one = effect.deflection(at, {name: float(value[number, 0]) for name, value in trials.items()})
+        for joint, part in moved.items():
+            assert_allclose(part[number], one[joint], rtol=0, atol=1e-15)
+
+
+def test_forward_of_inverse_is_the_pose() -> None:
+    robot = curved(3, 1e-3).with_effects(["compliance"]).with_values({"compliance_2": 1e-5})
+    q = robot.random_configurations(200, np.random.default_rng(4))
+    p, R = robot.world_poses(q)
+    assert np.abs(p - robot.rigid.world_poses(q)[0]).max() > 1e-4
+    found = inverse(robot, p, R, frame="world", seed=q)
+    assert found.complete
+    assert np.abs(robot.world_poses(found.joints)[0] - p).max() < 1e-9
+    regular = found.singular_value > 0.05
+    assert regular.sum() > 90
+    assert np.abs(found.joints - q)[regular].max() < 1e-9
+
+
+def test_a_file_holds_a_curve_in_a_few_lines(tmp_path: Path) -> None:
+    robot = curved(5)
+    one = replace(robot.parameters["curve_sin7_5"], nominal=1e-6)
+    for given_robot in (robot, robot.with_parameters([one])):
+        text = robot_text(given_robot)
+        path = tmp_path / "robot.yaml"
+        path.write_text(text)
+        again = read_robot(path)
+        assert again.known.keys() == given_robot.known.keys()
+        for name, p in given_robot.known.items():
+            for field in ("nominal", "value", "prior", "deviation"):
+                assert getattr(again.known[name], field) == pytest.approx(getattr(p, field), rel=1e-15)
+            assert again.known[name].informed == p.informed
+        assert robot_text(again) == text
+        assert text.count("\n") < robot_text(load_robot("irb120")).count("\n") + 30
+
+
+def test_terms_that_are_known_differently_stand_one_by_one(tmp_path: Path) -> None:
+    robot = curved(6, joints=(1,))
+    robot = robot.with_parameters([replace(robot.parameters["curve_cos9_1"], deviation=None)])
+    path = tmp_path / "robot.yaml"
+    path.write_text(robot_text(robot))
+    assert "joint_curves" not in path.read_text()
+    assert read_robot(path).known["curve_cos9_1"].deviation is None
+
+
+ENTRY = '\njoint_curves:\n  - {joint: 2, terms: "sin1 cos3", value: "0.01 0.02", prior: "0.1 0.1"}\n'
+
+
+def small_file(change: Callable[[str], str]) -> str:
+    text = robot_text(load_robot("irb120").with_effects(["joint-curve"]))
+    return change(text + ENTRY)
+
+
+def test_a_curve_may_be_written_by_hand(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(small_file(str))
+    robot = read_robot(tmp_path / "robot.yaml")
+    q = np.array([[0.0, 0.4, 0.0, 0.0, 0.0, 0.0]])
+    expected = np.radians(0.01 * np.sin(0.4) + 0.02 * np.cos(1.2))
+    assert robot.variables(q, robot.values)[1, 0] - 0.4 == pytest.approx(expected, rel=1e-12)
+    assert_array_equal(robot.variables(q, robot.values)[[0, 2, 3, 4, 5], 0], 0.0)
+
+
+SINGLE = "parameters: {curve_sin1_2: {unit: deg, nominal: 0, value: VALUE, prior: 1, informed: SHARE}}\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("  - joint-curve\n", "  - gain\n", ["joint_curves[1]", "Add the joint effect joint-curve"]),
+        ("joint: 2", "joint: 7", [".joint", "allowed: 1, 2, 3, 4, 5, 6"]),
+        ("sin1 cos3", "sin1 cos61", [".terms", f"cos{HIGHEST}"]),
+        ("sin1 cos3", "sin1 sin1", [".terms", "twice"]),
+        ("0.01 0.02", "0.01", [".value", "one for each term"]),
+        ("0.01 0.02", "0.01 nan", [".value"]),
+        ("0.01 0.02", "0.01 x", [".value"]),
+        ("0.1 0.1", "0.1 -0.1", [".prior", "0 or more"]),
+        ("0.1 0.1", "0.1 0.0", [".prior"]),
+        ("0.01 0.02", "0.01 -1000", [".value", "allowed: 30 deg or less"]),
+        ("0.1 0.1", "0.1 31", [".prior", "too large for a curve"]),
+        ('"0.1 0.1"', '"0.1 0.1", nominal: "99 0"', [".nominal", "got '99 deg'"]),
+        ('"0.1 0.1"', '"0.1 0.1", informed: "0.5 2"', [".informed", "allowed: 0 to 1"]),
+        ('"0.1 0.1"', '"0.1 0.1", informed: "-0.5 1"', [".informed", "got '-0.5'"]),
+        (ENTRY, "\n" + SINGLE.replace("VALUE", "31"), ["curve_sin1_2.value", "too large for a curve"]),
+        (ENTRY, "\n" + SINGLE.replace("SHARE", "2"), ["curve_sin1_2.informed", "too large"]),
+        (ENTRY, ENTRY + SINGLE, ["the parameter stands in joint_curves too; got 'curve_sin1_2'"]),
+    ],
+)
+def test_a_wrong_entry_is_refused(tmp_path: Path, old: str, new: str, told: list[str]) -> None:
+    text = small_file(lambda text: text.replace(old, new)).replace("VALUE", "0").replace("SHARE", "0.9")
+    (tmp_path / "robot.yaml").write_text(text)
+    with refused(*told):
+        read_robot(tmp_path / "robot.yaml")
+
+
+def test_a_term_may_stand_alone(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(
+        small_file(lambda text: text.replace(ENTRY, "\n" + SINGLE.replace("VALUE", "0.1").replace("SHARE", "0.9")))
+    )
+    assert read_robot(tmp_path / "robot.yaml").parameters["curve_sin1_2"].informed == 0.9

@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests import ur_controller as ur
+from tests.engine.robot.refusing import refused
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.library import load_robot
@@ -59,24 +60,34 @@ def ur10e_conf() -> str:
     return ur.conf_of(*(np.array(row) - own for row, own in zip(ur.UR10E_TABLE, plain, strict=True)))
 
 
-@pytest.mark.parametrize(("conf", "robot"), [(ur.UR10_CONF, "ur10"), (ur.UR3E_CONF, "ur3e"), (ur10e_conf(), "ur10e")])
-def test_poses_are_those_of_the_controllers_table(conf: str, robot: str, tmp_path: Path) -> None:
+PUBLISHED = ((ur.UR10_CONF, "ur10"), (ur.UR3E_CONF, "ur3e"), (ur10e_conf(), "ur10e"))
+
+
+def test_poses_are_those_of_the_controllers_table_and_frames_lie_beside_the_nominal_ones(tmp_path: Path) -> None:
     # Three arms as they were published, with d up to 446 m.
-    arm = made(tmp_path, conf, robot)
-    expected = ur.forward(ur.table(robot, conf), JOINTS)
-    for one in (arm, controller_robot(arm)):
-        positions, rotations = one.world_poses(JOINTS)
-        assert_allclose(positions, expected[:, :3, 3], rtol=0, atol=1e-9)
-        assert_allclose(rotations, expected[:, :3, :3], rtol=0, atol=1e-9)
+    for conf, robot in PUBLISHED:
+        arm, type_ = made(tmp_path, conf, robot), load_robot(robot)
+        expected = ur.forward(ur.table(robot, conf), JOINTS)
+        for one in (arm, controller_robot(arm)):
+            positions, rotations = one.world_poses(JOINTS)
+            assert_allclose(positions, expected[:, :3, 3], rtol=0, atol=1e-9, err_msg=robot)
+            assert_allclose(rotations, expected[:, :3, :3], rtol=0, atol=1e-9, err_msg=robot)
+        for unit, most in (("m", 2e-3), ("rad", 0.01)):
+            assert max(abs(p.value - p.nominal) for p in arm.parameters.values() if p.unit == unit) < most, robot
+        assert arm.masses == type_.masses
+        assert 0.5e-3 < mean_distance(arm, type_) < 3e-3
 
 
-@pytest.mark.parametrize(("conf", "robot"), [(ur.UR10_CONF, "ur10"), (ur.UR3E_CONF, "ur3e"), (ur10e_conf(), "ur10e")])
-def test_frames_lie_beside_the_nominal_ones(conf: str, robot: str, tmp_path: Path) -> None:
-    arm = made(tmp_path, conf, robot)
-    assert max(abs(p.value - p.nominal) for p in arm.parameters.values() if p.unit == "m") < 2e-3
-    assert max(abs(p.value - p.nominal) for p in arm.parameters.values() if p.unit == "rad") < 0.01
-    assert arm.masses == load_robot(robot).masses
-    assert 0.5e-3 < mean_distance(arm, load_robot(robot)) < 3e-3
+def test_a_file_of_another_type_or_kind_is_refused(tmp_path: Path) -> None:
+    for conf, robot in ((ur.UR10_CONF, "ur5e"), (ur.UR3E_CONF, "ur5"), (ur10e_conf(), "ur3e")):
+        with refused("another type of robot; got 'a flange ", " mm from that of ur", "allowed: 20 mm", of=robot):
+            refuse_far(made(tmp_path, conf, robot), load_robot(robot), "calibration.conf")
+    for robot in ("irb120", "li3", "kr5"):
+        with pytest.raises(InputError, match=r"another kind is given|must have the table and the frames"):
+            made(tmp_path, ur.UR10_CONF, robot)
+    for robot in ("irb120", "li3", "katana450"):
+        with refused("no arm of the kind that the format describes", of=robot):
+            exported(load_robot(robot), "ur-kinematics")
 
 
 def test_angles_of_the_ros_driver_are_read_in_the_order_in_which_it_writes_them(tmp_path: Path) -> None:
@@ -123,27 +134,8 @@ def test_frames_in_an_exported_file_are_those_of_urdf() -> None:
 def test_a_tilted_flange_is_said_to_be_left_out() -> None:
     arm = load_robot("ur5e").with_values({"alpha_6": 0.002, "a_6": 1e-3, "base_x": 1.0})
     said = " ".join(exported(arm, "ur-kinematics").left_out)
-    assert "cannot hold a flange beside the last axis" in said
+    assert "cannot hold a flange beside the last axis; left out: 1 mm and 0.1146 deg" in said
     assert "base_x" in said
-
-
-@pytest.mark.parametrize("robot", ["irb120", "li3", "katana450"])
-def test_another_arm_goes_into_no_kinematics_file(robot: str) -> None:
-    with pytest.raises(InputError, match="no arm of the kind that the format describes"):
-        exported(load_robot(robot), "ur-kinematics")
-
-
-@pytest.mark.parametrize(("conf", "robot"), [(ur.UR10_CONF, "ur5e"), (ur.UR3E_CONF, "ur5"), (ur10e_conf(), "ur3e")])
-def test_a_file_of_another_type_is_refused(conf: str, robot: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"another type of robot; got 'a flange .* mm from that of ur") as refusal:
-        refuse_far(made(tmp_path, conf, robot), load_robot(robot), "calibration.conf")
-    assert "allowed: 20 mm" in str(refusal.value)
-
-
-@pytest.mark.parametrize("robot", ["irb120", "li3", "kr5"])
-def test_a_type_of_another_kind_is_refused(robot: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"another kind is given|must have the table and the frames"):
-        made(tmp_path, ur.UR10_CONF, robot)
 
 
 @pytest.mark.parametrize(
@@ -154,47 +146,40 @@ def test_a_type_of_another_kind_is_refused(robot: str, tmp_path: Path) -> None:
         (r", 0.999.*|, 9.74999561134540574e-07\]", "]", "six numbers in brackets belong here"),
         (r", 9.74999561134540574e-07\]", "", "six numbers in brackets belong here"),
         ("-0.103609197138685979", "nan", "six numbers in brackets belong here"),
-        ("-0.103609197138685979", "1e400", "finite|range|large|six numbers"),
+        ("-0.103609197138685979", "1e400", "calibration.conf"),
         ("calibration_status = 2", "calibration_status = 1", "does not compute with these kinematics"),
         (r"delta_a = ", "delta_d = ", "an entry is given twice"),
-        ("0x6e0f7bf", "0x6\x07", "joint_checksum: this is no checksum; .* one line of up to 200 characters"),
+        ("0x6e0f7bf", "0x6\x07", "joint_checksum: this is no checksum"),
         ("0x6e0f7bf", "0x6e0f7bf" * 10_000, "joint_checksum: this is no checksum"),
     ],
 )
 def test_a_damaged_file_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
     text = re.sub(old, new, ur.UR10_CONF, count=1)
     assert text != ur.UR10_CONF
-    with pytest.raises(InputError, match=said):
+    with refused(said):
         read_kinematics(written(tmp_path, text))
 
 
-@pytest.mark.parametrize(
-    ("old", "new"), [("wrist_3", "wrist_4"), ("hash", "hush"), ("yaw: 1.5413963267648517e-05", "yaw: east")]
-)
-def test_a_damaged_file_of_the_ros_driver_is_refused(old: str, new: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"ros\.yaml, kinematics"):
-        read_kinematics(written(tmp_path, ROS.replace(old, new), "ros.yaml"))
+def test_a_damaged_file_of_the_ros_driver_is_refused(tmp_path: Path) -> None:
+    for old, new in (("wrist_3", "wrist_4"), ("hash", "hush"), ("yaw: 1.5413963267648517e-05", "yaw: east")):
+        with refused("ros.yaml, kinematics", of=new):
+            read_kinematics(written(tmp_path, ROS.replace(old, new), "ros.yaml"))
+    # As a copy that broke off in its last number leaves it.
+    rows = re.findall(r"  (\w+): \{([^}]*)\}", ROS)
+    lines = [f"  {link}:\n" + re.sub(r"(\w+: [^,}\s]+)[,\s]*", r"    \1\n", row) for link, row in rows]
+    broken = re.sub(r"yaw: -3\.1\d+\n$", "yaw: -3.1", "kinematics:\n" + "".join(lines))
+    assert broken.endswith("yaw: -3.1")
+    for text in (ROS.partition("  hash")[0], ROS.partition("  hash")[0] + "  hash: ''\n", broken):
+        with refused("ros.yaml, kinematics: the hash is missing, so the file is not whole", of=text[-30:]):
+            read_kinematics(written(tmp_path, text, "ros.yaml"))
 
 
-@pytest.mark.parametrize("end", ["  hash: ''\n", "", "without its yaw"])
-def test_a_file_of_the_ros_driver_without_its_end_is_refused(end: str, tmp_path: Path) -> None:
-    text = ROS.partition("  hash")[0] + end
-    if end == "without its yaw":  # as a copy that broke off leaves it
-        text = "kinematics:\n" + "".join(
-            f"  {link}:\n" + "".join(f"    {name}: {value}\n" for name, value in re.findall(r"(\w+): ([^,}\s]+)", row))
-            for link, row in re.findall(r"  (\w+): \{([^}]*)\}", ROS)
-        )
-        text = re.sub(r"yaw: -3\.1\d+\n$", "yaw: -3.1", text)
-        assert text.endswith("yaw: -3.1")
-    with pytest.raises(InputError, match=r"ros\.yaml, kinematics: the hash is missing, so the file is not whole"):
-        read_kinematics(written(tmp_path, text, "ros.yaml"))
-
-
-@pytest.mark.parametrize("text", ["\n" * 300_000 + "x: 1\n", "delta_" + "a" * 300_000, "delta_a" + " " * 300_000 + "b"])
-def test_a_file_of_blanks_is_refused_at_once(text: str, tmp_path: Path) -> None:
+def test_what_is_no_kinematics_file_is_refused_and_a_file_of_blanks_at_once(tmp_path: Path) -> None:
     # Of so many blank lines each was once read again from every one before it, which would take ten minutes.
-    with pytest.raises(InputError, match=r"some\.yaml"):
-        read_kinematics(written(tmp_path, text, "some.yaml"))
+    blanks = ("\n" * 300_000 + "x: 1\n", "delta_" + "a" * 300_000, "delta_a" + " " * 300_000 + "b")
+    for text in ("a,b,c\n1,2,3\n", "truearm: truearm-robot/1\nname: x\n", *blanks):
+        with refused("some.yaml", of=text[:20]):
+            read_kinematics(written(tmp_path, text, "some.yaml"))
 
 
 def test_blanks_before_a_list_are_read(tmp_path: Path) -> None:
@@ -203,39 +188,27 @@ def test_blanks_before_a_list_are_read(tmp_path: Path) -> None:
     assert found.deltas == read_kinematics(written(tmp_path, ur.UR10_CONF)).deltas
 
 
-def with_turned_flange(angle: float) -> str:
-    """Return a published file with another zero of joint 6, which moves no flange."""
-    theta, a, d, alpha = ur.deltas(ur.UR10_CONF)
-    return ur.conf_of(theta + np.array([0, 0, 0, 0, 0, angle]), a, d, alpha)
-
-
 def test_a_flange_that_is_turned_far_is_refused(tmp_path: Path) -> None:
     type_ = load_robot("ur10")
-    plain, turned = (made(tmp_path, with_turned_flange(angle), "ur10") for angle in (0.0, 0.09))
+    theta, a, d, alpha = ur.deltas(ur.UR10_CONF)
+    zeros = (theta + np.array([0, 0, 0, 0, 0, angle]) for angle in (0.0, 0.09))  # of joint 6, which moves no flange
+    plain, turned = (made(tmp_path, ur.conf_of(zero, a, d, alpha), "ur10") for zero in zeros)
     assert mean_distance(turned, type_) == pytest.approx(mean_distance(plain, type_))
     assert np.degrees(mean_angle(plain, type_)) == pytest.approx(0.362, abs=1e-3)
     assert np.degrees(mean_angle(turned, type_)) == pytest.approx(np.degrees(0.09), abs=0.1)
     refuse_far(plain, type_, "calibration.conf")
-    with pytest.raises(InputError, match=r"got 'a flange turned by 5\.18 deg from that of ur10 on average'") as refusal:
+    with refused("a flange turned by 5.18 deg from that of ur10 on average", "allowed: 1 deg"):
         refuse_far(turned, type_, "calibration.conf")
-    assert "allowed: 1 deg" in str(refusal.value)
 
 
-def test_joint_zeros_that_cancel_at_the_flange_are_refused_at_the_link(tmp_path: Path) -> None:
+def test_joint_zeros_that_cancel_at_the_flange_are_refused_at_the_link() -> None:
     # Axes 2 and 3 are parallel: the flange is not turned, and that of a short arm moves less than 20 mm.
-    arm = load_robot("ur3e").with_values({"theta_offset_2": 0.045, "theta_offset_3": -0.045})
-    assert mean_angle(arm, load_robot("ur3e")) < 1e-6
-    assert mean_distance(arm, load_robot("ur3e")) < 0.02
-    with pytest.raises(InputError, match=r"does not come to lie beside the nominal one.* 2\.58 deg") as refusal:
-        refuse_far(arm, load_robot("ur3e"), "calibration.conf")
-    assert "allowed: 50 mm, 2 deg" in str(refusal.value)
-    assert "link 2" in str(refusal.value)
-
-
-def test_what_is_no_kinematics_file_is_refused(tmp_path: Path) -> None:
-    for text in ("a,b,c\n1,2,3\n", "truearm: truearm-robot/1\nname: x\n"):
-        with pytest.raises(InputError):
-            read_kinematics(written(tmp_path, text, "some.yaml"))
+    type_ = load_robot("ur3e")
+    arm = type_.with_values({"theta_offset_2": 0.045, "theta_offset_3": -0.045})
+    assert mean_angle(arm, type_) < 1e-6
+    assert mean_distance(arm, type_) < 0.02
+    with refused("does not come to lie beside the nominal one", "2.58 deg", "allowed: 50 mm, 2 deg", "link 2"):
+        refuse_far(arm, type_, "calibration.conf")
 
 
 def test_a_base_aside_of_the_first_axis_is_refused(tmp_path: Path) -> None:
@@ -281,12 +254,14 @@ def test_a_robot_file_holds_what_the_controller_computes_with(tmp_path: Path) ->
         assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("word", ["nominal", "proprietary", "unknown"])
-def test_a_robot_file_says_it_in_a_word(word: str, tmp_path: Path) -> None:
-    text = robot_text(load_robot("ur10")).replace("controller:\n", f"controller:\n  kinematics: {word}\n")
-    arm = read_robot(written(tmp_path, text, "arm.yaml"))
-    assert arm.controller.kinematics.kind == word
-    assert read_robot(written(tmp_path, robot_text(arm), "again.yaml")) == arm
+def test_a_robot_file_says_it_in_a_word_and_where_that_is_known_from(tmp_path: Path) -> None:
+    plain = robot_text(load_robot("ur10"))
+    for kind in ("nominal", "proprietary", "unknown"):
+        for entry, source in ((kind, ""), (f"{{kind: {kind}, source: the order}}", "the order")):
+            text = plain.replace("controller:\n", f"controller:\n  kinematics: {entry}\n")
+            arm = read_robot(written(tmp_path, text, "arm.yaml"))
+            assert (arm.controller.kinematics.kind, arm.controller.kinematics.source) == (kind, source)
+            assert read_robot(written(tmp_path, robot_text(arm), "again.yaml")) == arm, entry
 
 
 @pytest.mark.parametrize(
@@ -298,22 +273,16 @@ def test_a_robot_file_says_it_in_a_word(word: str, tmp_path: Path) -> None:
         ("12", "text|known|kinematics"),
         ("{kind: own}", "one row belongs here for each joint"),
         ("{kind: nominal, joints: [{theta_offset: 0, d: 0, a: 0, alpha: 0}]}", "nominal kinematics have no rows"),
-        ("{kind: secret}", r"controller\.kinematics\.kind: this value is not known"),
-        (
-            "{kind: proprietary, joints: [{theta_offset: 0, d: 0, a: 0, alpha: 0}]}",
-            "proprietary kinematics have no rows",
-        ),
+        ("{kind: secret}", r"kinematics\.kind: this value is not known"),
+        ("{kind: proprietary, joints: [{theta_offset: 0, d: 0, a: 0, alpha: 0}]}", "proprietary kinematics have no"),
         ("{kind: own, identity: {hash: " + "a" * 201 + "}}", r"kinematics\.identity\.hash: this is no checksum"),
-        (
-            "{kind: own, joints: [{theta_offset: 0, d: .nan, a: 0, alpha: 0}]}",
-            r"kinematics\.joints\[1\]\.d: .*not a num",
-        ),
-        ("{kind: own, joints: [{theta_offset: 0, a: 0, alpha: 0}]}", r"kinematics\.joints\[1\]\.d: this entry is mis"),
-        ("{kind: own, rows: []}", r"kinematics\.rows: this entry is not known here; allowed: kind, source, identity"),
-        ("", r"controller\.kinematics: this does not say .* got nothing; allowed: nominal, prop"),
-        ("''", r"controller\.kinematics: this does not say .* got ''; allowed: nominal, prop"),
-        ("3", r"controller\.kinematics: this does not say .* got 3; allowed: nominal, prop"),
-        ("[nominal]", r"controller\.kinematics: this does not say .* got \[nominal\]; allowed: nominal, prop"),
+        ("{kind: own, joints: [{theta_offset: 0, d: .nan, a: 0, alpha: 0}]}", r"joints\[1\]\.d: .*not a num"),
+        ("{kind: own, joints: [{theta_offset: 0, a: 0, alpha: 0}]}", r"joints\[1\]\.d: this entry is mis"),
+        ("{kind: own, rows: []}", r"kinematics\.rows: this entry is not known here"),
+        ("", r"kinematics: this does not say .* got nothing; allowed: nominal, prop"),
+        ("''", r"kinematics: this does not say .* got ''"),
+        ("3", r"kinematics: this does not say .* got 3"),
+        ("[nominal]", r"kinematics: this does not say .* got \[nominal\]"),
         ("{kind: own, joints: [" + "{theta_offset: 0, d: 0, a: 0, alpha: 0}, " * 6 + "]}", "another type of robot"),
     ],
 )
@@ -324,34 +293,21 @@ def test_kinematics_that_nobody_can_read_are_refused(entry: str, said: str, tmp_
         read_robot(written(tmp_path, text, "arm.yaml"))
 
 
-@pytest.mark.parametrize("kind", ["nominal", "proprietary", "unknown"])
-def test_a_robot_file_says_where_a_word_is_known_from(kind: str, tmp_path: Path) -> None:
-    entry = f"  kinematics: {{kind: {kind}, source: the order}}"
-    text = robot_text(load_robot("ur10")).replace("controller:\n", f"controller:\n{entry}\n")
-    arm = read_robot(written(tmp_path, text, "arm.yaml"))
-    assert (arm.controller.kinematics.kind, arm.controller.kinematics.source) == (kind, "the order")
-    assert read_robot(written(tmp_path, robot_text(arm), "again.yaml")) == arm
-
-
-@pytest.mark.parametrize(
-    ("row", "column", "wrong", "said"),
-    [
-        (1, "a", 60.0, r"another type of robot; got 'a flange .* mm from that of ur10"),
+def test_rows_of_another_arm_in_a_robot_file_are_refused(tmp_path: Path) -> None:
+    yaml = YAML(typ="safe")
+    text = robot_text(made(tmp_path, ur.UR10_CONF, "ur10"))
+    for row, column, wrong, said in (
+        (1, "a", 60.0, "another type of robot"),
         (5, "theta_offset", 5.0, "no arm of this type"),
         (1, "beta", 30.0, "another type of robot"),
-    ],
-)
-def test_rows_of_another_arm_in_a_robot_file_are_refused(
-    row: int, column: str, wrong: float, said: str, tmp_path: Path
-) -> None:
-    yaml = YAML(typ="safe")
-    content = yaml.load(robot_text(made(tmp_path, ur.UR10_CONF, "ur10")))
-    rows = content["controller"]["kinematics"]["joints"]
-    rows[row][column] = rows[row].get(column, 0.0) + wrong
-    with (tmp_path / "arm.yaml").open("w") as stream:
-        yaml.dump(content, stream)
-    with pytest.raises(InputError, match=rf"arm\.yaml, controller\.kinematics: .*{said}"):
-        read_robot(tmp_path / "arm.yaml")
+    ):
+        content = yaml.load(text)
+        rows = content["controller"]["kinematics"]["joints"]
+        rows[row][column] = rows[row].get(column, 0.0) + wrong
+        with (tmp_path / "arm.yaml").open("w") as stream:
+            yaml.dump(content, stream)
+        with refused("arm.yaml, controller.kinematics: ", said, of=column):
+            read_robot(tmp_path / "arm.yaml")
 
 
 def test_rows_of_a_robot_of_another_kind_are_refused(tmp_path: Path) -> None:

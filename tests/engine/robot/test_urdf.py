@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests.arms import ARMS
+from tests.engine.robot.refusing import refused
+from tests.engine.robot.test_chain import random_robot
 
-from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array, Chain
 from truearm.engine.robot.conventions import CONVENTIONS
 from truearm.engine.robot.conventions.convention import Convention, JointKind
@@ -41,41 +42,29 @@ UR_LIKE = b"""<?xml version="1.0" ?>
   </joint>
   <link name="base_link"><inertial><mass value="4.0"/><origin xyz="0 0 0.1"/></inertial></link>
   <joint name="shoulder_pan_joint" type="revolute">
-    <parent link="base_link"/>
-    <child link="shoulder_link"/>
-    <origin rpy="0.0 0.0 0.0" xyz="0.0 0.0 0.089159"/>
-    <axis xyz="0 0 1"/>
-    <limit effort="150.0" lower="-6.2832" upper="6.2832" velocity="3.15"/>
+    <parent link="base_link"/><child link="shoulder_link"/><origin rpy="0.0 0.0 0.0" xyz="0.0 0.0 0.089159"/>
+    <axis xyz="0 0 1"/><limit effort="150.0" lower="-6.2832" upper="6.2832" velocity="3.15"/>
   </joint>
   <link name="shoulder_link">
     <visual><origin rpy="0 0 1" xyz="1 2 3"/><geometry><sphere radius="0.1"/></geometry></visual>
     <inertial>
-      <mass value="3.7"/>
-      <origin rpy="0.0 0.0 0.0" xyz="0.0 0.01 0.0"/>
+      <mass value="3.7"/><origin rpy="0.0 0.0 0.0" xyz="0.0 0.01 0.0"/>
       <inertia ixx="0.01" ixy="0.0" ixz="0.0" iyy="0.01" iyz="0.0" izz="0.01"/>
     </inertial>
   </link>
   <joint name="shoulder_lift_joint" type="revolute">
-    <parent link="shoulder_link"/>
-    <child link="upper_arm_link"/>
-    <origin rpy="0.0 1.5708 0.0" xyz="0.0 0.13585 0.0"/>
-    <axis xyz="0 1 0"/>
-    <limit effort="150.0" lower="-6.2832" upper="6.2832" velocity="3.15"/>
+    <parent link="shoulder_link"/><child link="upper_arm_link"/><origin rpy="0.0 1.5708 0.0" xyz="0.0 0.13585 0.0"/>
+    <axis xyz="0 1 0"/><limit effort="150.0" lower="-6.2832" upper="6.2832" velocity="3.15"/>
   </joint>
   <link name="upper_arm_link"/>
   <joint name="elbow_joint" type="revolute">
-    <parent link="upper_arm_link"/>
-    <child link="forearm_link"/>
-    <origin rpy="0.0 0.0 0.0" xyz="0.0 -0.1197 0.42500"/>
-    <axis xyz="0 1 0"/>
-    <limit effort="150.0" lower="-3.1416" upper="3.1416" velocity="3.15"/>
+    <parent link="upper_arm_link"/><child link="forearm_link"/><origin rpy="0.0 0.0 0.0" xyz="0.0 -0.1197 0.42500"/>
+    <axis xyz="0 1 0"/><limit effort="150.0" lower="-3.1416" upper="3.1416" velocity="3.15"/>
   </joint>
   <link name="forearm_link"/>
   <joint name="wrist_1_joint" type="continuous">
-    <parent link="forearm_link"/>
-    <child link="wrist_1_link"/>
-    <origin rpy="0.0 1.5707963267948966 0.0" xyz="0.0 0.0 0.39225"/>
-    <axis xyz="0 1 0"/>
+    <parent link="forearm_link"/><child link="wrist_1_link"/>
+    <origin rpy="0.0 1.5707963267948966 0.0" xyz="0.0 0.0 0.39225"/><axis xyz="0 1 0"/>
   </joint>
   <link name="wrist_1_link"/>
   <joint name="flange_joint" type="fixed">
@@ -83,8 +72,7 @@ UR_LIKE = b"""<?xml version="1.0" ?>
   </joint>
   <link name="flange">
     <inertial>
-      <mass value="0.3"/>
-      <inertia ixx="0.01" ixy="0.0" ixz="0.0" iyy="0.01" iyz="0.0" izz="0.01"/>
+      <mass value="0.3"/><inertia ixx="0.01" ixy="0.0" ixz="0.0" iyy="0.01" iyz="0.0" izz="0.01"/>
     </inertial>
   </link>
   <joint name="sensor_joint" type="fixed">
@@ -213,19 +201,13 @@ def without_origins(content: bytes) -> bytes:
 # -- reading ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "tip"), [("ur_like", "tool0"), ("odd", "l5")])
-def test_poses_are_pinocchios(name: str, tip: str, tmp_path: Path) -> None:
-    check_poses(read(FILES[name], tmp_path), FILES[name], tip, atol=1e-12)
-
-
-@pytest.mark.parametrize("tip", ["sensor", "flange", "wrist_1_link", "forearm_link", "shoulder_link"])
-def test_chain_ends_at_the_named_link(tip: str, tmp_path: Path) -> None:
-    robot = read(UR_LIKE, tmp_path, tip)
-    assert len(robot.joints) == {"forearm_link": 3, "shoulder_link": 1}.get(tip, 4)
-    names = [joint.name for joint in robot.joints]
-    q = robot.random_configurations(5, np.random.default_rng(1))
-    for actual, expected in zip(robot.world_poses(q), Pinocchio(UR_LIKE).poses(names, q, tip), strict=True):
-        assert_allclose(actual, expected, rtol=0, atol=1e-12)
+def test_poses_are_pinocchios(tmp_path: Path) -> None:
+    check_poses(read(ODD, tmp_path), ODD, "l5", atol=1e-12)
+    check_poses(read(UR_LIKE, tmp_path), UR_LIKE, "tool0", atol=1e-12)
+    for tip in ("sensor", "flange", "wrist_1_link", "forearm_link", "shoulder_link"):
+        robot = read(UR_LIKE, tmp_path, tip)
+        assert len(robot.joints) == {"forearm_link": 3, "shoulder_link": 1}.get(tip, 4)
+        check_poses(robot, UR_LIKE, tip, atol=1e-12)
 
 
 def test_what_the_file_says_of_the_joints(tmp_path: Path) -> None:
@@ -268,37 +250,35 @@ def joint(name: str, parent: str, child: str, type_: str = "continuous", inside:
 ARM = joint("j1", "a", "b")
 
 
-@pytest.mark.parametrize(
-    ("links", "tip"),
-    [(("tool0", "flange"), "tool0"), (("flange", "tool0"), "tool0"), (("flange", "x"), "flange"), (("x", "y"), "b")],
-)
-def test_end_is_tool0_or_flange_or_the_last_moving_link(links: tuple[str, str], tip: str, tmp_path: Path) -> None:
-    fixed = [
-        joint(f"f{i}", "b", link, "fixed", f'<origin xyz="{i} 2 3" rpy="0 0 {i}"/>') for i, link in enumerate(links, 1)
-    ]
-    content = simple(ARM, *fixed, links=("a", "b", *links))
-    check_poses(read(content, tmp_path), content, tip, atol=1e-12)
-
-
-def test_gripper_is_left_out_when_the_end_is_named(tmp_path: Path) -> None:
+def test_end_is_tool0_or_flange_or_the_last_moving_link_or_is_named(tmp_path: Path) -> None:
+    for links, tip in (
+        (("tool0", "flange"), "tool0"),
+        (("flange", "tool0"), "tool0"),
+        (("flange", "x"), "flange"),
+        (("x", "y"), "b"),
+    ):
+        places = [f'<origin xyz="{i} 2 3" rpy="0 0 {i}"/>' for i in (1, 2)]
+        fixed = [joint(f"f{link}", "b", link, "fixed", at) for link, at in zip(links, places, strict=True)]
+        content = simple(ARM, *fixed, links=("a", "b", *links))
+        check_poses(read(content, tmp_path), content, tip, atol=1e-12)
     fingers = (joint("left", "b", "c"), joint("right", "b", "d", inside='<mimic joint="left"/>'))
-    robot = read(simple(ARM, *fingers), tmp_path, "b")
-    assert [j.name for j in robot.joints] == ["j1"]
+    assert [j.name for j in read(simple(ARM, *fingers), tmp_path, "b").joints] == ["j1"]
 
 
-@pytest.mark.parametrize(
-    ("name", "file", "expected"),
-    [("my.robot-1", "x.urdf", "my.robot-1"), ("my robot", "cell_3.urdf", "cell_3"), ("", "cell_3.urdf", "cell_3")],
-)
-def test_robot_is_named_by_the_robot_or_the_file(name: str, file: str, expected: str, tmp_path: Path) -> None:
-    assert read_urdf(written(simple(ARM, links=("a", "b"), name=name), tmp_path, file)).name == expected
+def test_robot_is_named_by_the_robot_or_the_file(tmp_path: Path) -> None:
+    for name, file, expected in (
+        ("my.robot-1", "x.urdf", "my.robot-1"),
+        ("my robot", "cell_3.urdf", "cell_3"),
+        ("", "cell_3.urdf", "cell_3"),
+    ):
+        assert read_urdf(written(simple(ARM, links=("a", "b"), name=name), tmp_path, file)).name == expected
 
 
-@pytest.mark.parametrize("content", [b"\xef\xbb\xbf" + UR_LIKE, UR_LIKE.replace(b"\n", b"\r"), ODD])
-def test_encodings_and_line_ends_are_read(content: bytes, tmp_path: Path) -> None:
-    robot = read(content, tmp_path)
-    assert len(robot.joints) >= 4
-    assert calibrated_urdf(content, robot)[0] == content
+def test_encodings_and_line_ends_are_read(tmp_path: Path) -> None:
+    for content in (b"\xef\xbb\xbf" + UR_LIKE, UR_LIKE.replace(b"\n", b"\r"), ODD):
+        robot = read(content, tmp_path)
+        assert len(robot.joints) >= 4
+        assert calibrated_urdf(content, robot)[0] == content
 
 
 # -- refusals --------------------------------------------------------------------------------------------------
@@ -313,127 +293,87 @@ def only(inside: str = "", type_: str = "continuous") -> bytes:
     return simple(joint("j", "a", "b", type_, inside), links=AB)
 
 
-REFUSED: dict[str, tuple[bytes, tuple[str, ...]]] = {
-    "empty": (b" \n", ("robot.urdf", "empty")),
-    "not XML": (b"truearm: truearm-robot/1\n", ("robot.urdf, line 1", "not valid XML")),
-    "broken XML": (UR_LIKE.replace(b"</robot>", b"</robt>"), ("line 74", "not valid XML", "mismatched tag")),
-    "not a URDF": (b"<sdf version='1.6'/>", ("not a URDF", "'<sdf>'", "<robot>")),
-    "UTF-16": (UR_LIKE.decode().encode("utf-16"), ("UTF-8", "Save it")),
-    "unknown encoding": (b"<?xml version='1.0' encoding='klingon'?><robot/>", ("encoding", "klingon", "UTF-8")),
-    "multi-byte encoding": (b"<?xml version='1.0' encoding='shift-jis'?><robot/>", ("encoding", "UTF-8")),
-    "entities": (b'<!DOCTYPE robot [<!ENTITY a "b">]><robot name="r"/>', ("DOCTYPE", "Delete")),
-    "xacro tag": (b'<robot name="r">\n<xacro:macro name="m"/></robot>', ("line 2", "xacro", "xacro FILE.xacro >")),
-    "xacro value": (simple(ARM, links=("a", "${prefix}b")), ("line 3", "xacro")),
-    "no links": (b'<robot name="r"/>', ("no <link>",)),
-    "no joints": (simple(links=("a",)), ("no moving joint", "revolute, continuous, prismatic")),
-    "nothing moves": (only(type_="fixed"), ("no moving joint",)),
-    "nameless link": (b'<robot name="r"><link/></robot>', ("line 1", "<link> has no name")),
-    "nameless joint": (simple('<joint type="fixed"/>'), ("line 6", "<joint> has no name")),
-    "two links of a name": (simple(ARM, links=("a", "b", "b")), ("line 4", "two links", "'b'")),
-    "two joints of a name": (simple(ARM, joint("j1", "b", "c")), ("line 7", "two joints", "'j1'")),
-    "unknown type": (only(type_="hinge"), ("joint j", "type", "'hinge'", "revolute")),
-    "no type": (simple('<joint name="j"/>', links=AB), ("joint j", "type", "revolute, continuous, prismatic, fixed")),
-    "no parent": (simple('<joint name="j" type="fixed"><child link="b"/></joint>'), ("joint j", "no <parent")),
-    "no child": (simple('<joint name="j" type="fixed"><parent link="a"/></joint>'), ("joint j", "no <child")),
-    "two parents": (simple(joint("j", "a", "b", inside='<parent link="b"/>')), ("joint j", "more than one <parent>")),
-    "unknown parent": (simple(joint("j", "base", "b"), links=("base_x", "b")), ("joint j, <parent>", "base_x")),
-    "unknown child": (simple(joint("j", "a", "q"), links=AB), ("joint j, <child>", "no link", "'q'", "a, b")),
-    "link on two joints": (
-        simple(ARM, joint("j2", "a", "c"), joint("j3", "b", "d"), joint("j4", "c", "d")),
-        ("loop", "link d", "j3 and j4"),
-    ),
-    "ring": (simple(ARM, joint("j2", "b", "a"), links=AB), ("loop", "no root", "a, b")),
-    "ring beside the tree": (simple(ARM, joint("j2", "c", "d"), joint("j3", "d", "c")), ("loop", "'c, d'")),
-    "joint to itself": (simple(joint("j", "b", "b"), links=AB), ("loop", "'b'")),
-    "several roots": (simple(ARM, joint("j2", "c", "d")), ("one root", "'a, c'", "fixed joint")),
-    "branch": (
-        simple(ARM, joint("f", "b", "tool0", "fixed"), GRIPPER, links=("a", "b", "c", "d", "tool0")),
-        ("branch", "outermost joints: l, r", "such as tool0, c, d", "robot.urdf#tool0"),
-    ),
-    "two arms": (simple(ARM, joint("j2", "a", "c"), links=("a", "b", "c")), ("branch", "such as b, c", "robot.urdf#b")),
-    "floating": (only(type_="floating"), ("joint j", "type", "'floating'", "fixed")),
-    "planar": (only(type_="planar"), ("joint j", "'planar'")),
-    "mimic": (only('<mimic joint="x"/>'), ("joint j", "mimics", "#LINK")),
-    "name of a joint": (simple(joint("left joint", "a", "b"), links=AB), ("joint left joint", "letters", "Rename")),
-    "xyz of two": (only('<origin xyz="0 1"/>'), ("joint j", "<origin xyz>", "'0 1'", "3 numbers")),
-    "rpy of words": (only('<origin rpy="0 pi 0"/>'), ("joint j", "<origin rpy>", "'0 pi 0'")),
-    "rpy of no numbers": (only('<origin rpy="0 nan 1_0"/>'), ("<origin rpy>", "nan")),
-    "xyz without end": (only('<origin xyz="0 0 1e999"/>'), ("<origin xyz>", "1e999")),
-    "xyz beyond the moon": (only('<origin xyz="0 0 1e9"/>'), ("joint j", "<origin xyz>", "too large", "'0 0 1e9'")),
-    "limit without end": (
-        simple(TURN.replace('"-1"', '"-1e16"'), links=AB),
-        ("joint turn", "<limit lower>", "too large", "'-1e16'"),
-    ),
-    "xyz with commas": (only('<origin xyz="0,0,1"/>'), ("<origin xyz>", "spaces between")),
-    "fixed xyz": (
-        simple(ARM, joint("f", "b", "tool0", "fixed", '<origin xyz=""/>'), links=("a", "b", "tool0")),
-        ("joint f", "<origin xyz>"),
-    ),
-    "two origins": (only("<origin/><origin/>"), ("joint j", "more than one <origin>")),
-    "axis of two": (only('<axis xyz="0 1"/>'), ("joint j", "<axis xyz>")),
-    "axis of zero": (only('<axis xyz="0 0 0"/>'), ("joint j", "unit vector", "direction")),
-    "long axis": (
-        only('<axis xyz="0 3 -4"/>'),
-        ("joint j", "unit vector", "'0.0 3.0 -4.0'", "0 0.6 -0.8"),
-    ),
-    "no limit": (only(type_="revolute"), ("joint j", "revolute", "<limit>", "continuous")),
-    "no limit of a slide": (only(type_="prismatic"), ("joint j", "prismatic", "Give the joint's limits.")),
-    "word as a limit": (simple(TURN.replace('"-1"', "'low'"), links=AB), ("joint turn", "<limit lower>", "'low'")),
-    "velocity below zero": (
-        simple(TURN.replace('velocity="1"', 'velocity="-1"'), links=AB),
-        ("joint turn", "velocity of a <limit> cannot be negative", "-1"),
-    ),
-    "word as a velocity": (
-        simple(TURN.replace('velocity="1"', 'velocity="fast"'), links=AB),
-        ("joint turn", "<limit velocity>", "'fast'"),
-    ),
-    "limits that close": (
-        simple(TURN.replace('"-1"', '"0"').replace('upper="1"', ""), links=AB),
-        ("joint turn", "lower limit must be below", "lower 0.0, upper 0.0", "continuous"),
-    ),
-    "inertial without mass": (
-        simple(ARM, links=AB).replace(b'<link name="b"/>', b'<link name="b"><inertial/></link>'),
-        ("line 3, link b", "<mass"),
-    ),
-    "negative mass": (
-        simple(ARM, links=AB).replace(b'"b"/>\n', b'"b"><inertial><mass value="-1"/></inertial></link>\n', 1),
-        ("link b", "negative", "-1"),
-    ),
-    "bad mass": (
-        simple(ARM, links=AB).replace(b'"b"/>\n', b'"b"><inertial><mass value="1 kg"/></inertial></link>\n', 1),
-        ("link b", "<mass value>", "'1 kg'", "one number"),
-    ),
-}  # fmt: skip
+def with_mass(inside: str) -> bytes:
+    """A file whose second link has this inertial entry."""
+    return simple(ARM, links=AB).replace(b'"b"/>\n', f'"b"><inertial>{inside}</inertial></link>\n'.encode(), 1)
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_file_is_refused(case: str, tmp_path: Path) -> None:
-    content, parts = REFUSED[case]
-    with pytest.raises(InputError) as refusal:
-        read(content, tmp_path)
-    for part in (str(tmp_path), *parts):
-        assert part in str(refusal.value)
+def limited(old: str, new: str) -> bytes:
+    """A file whose joint has other limits."""
+    return simple(TURN.replace(old, new), links=AB)
 
 
-@pytest.mark.parametrize(
-    ("tip", "parts"),
-    [("tool", ("no link of this name", "'tool'", "tool0")), ("world", ("no joint moves", "root world", "link world"))],
-)
-def test_named_end_is_refused(tip: str, parts: tuple[str, ...], tmp_path: Path) -> None:
-    with pytest.raises(InputError) as refusal:
-        read(UR_LIKE, tmp_path, tip)
-    for part in ("robot.urdf", *parts):
-        assert part in str(refusal.value)
+FIXED = joint("f", "b", "tool0", "fixed")
+REFUSED: list[tuple[bytes, tuple[str, ...]]] = [
+    (b" \n", ("robot.urdf", "empty")),
+    (b"truearm: truearm-robot/1\n", ("robot.urdf, line 1", "not valid XML")),
+    (UR_LIKE.replace(b"</robot>", b"</robt>"), ("line 61", "not valid XML", "mismatched tag")),
+    (b"<sdf version='1.6'/>", ("not a URDF", "'<sdf>'")),
+    (UR_LIKE.decode().encode("utf-16"), ("UTF-8", "Save it")),
+    (b"<?xml version='1.0' encoding='klingon'?><robot/>", ("encoding", "klingon", "UTF-8")),
+    (b"<?xml version='1.0' encoding='shift-jis'?><robot/>", ("encoding", "UTF-8")),
+    (b'<!DOCTYPE robot [<!ENTITY a "b">]><robot name="r"/>', ("DOCTYPE", "Delete")),
+    (b'<robot name="r">\n<xacro:macro name="m"/></robot>', ("line 2", "xacro FILE.xacro >")),
+    (simple(ARM, links=("a", "${prefix}b")), ("line 3", "xacro")),
+    (b'<robot name="r"/>', ("no <link>",)),
+    (simple(links=("a",)), ("no moving joint", "revolute, continuous, prismatic")),
+    (only(type_="fixed"), ("no moving joint",)),
+    (b'<robot name="r"><link/></robot>', ("line 1", "<link> has no name")),
+    (simple('<joint type="fixed"/>'), ("line 6", "<joint> has no name")),
+    (simple(ARM, links=("a", "b", "b")), ("line 4", "two links", "'b'")),
+    (simple(ARM, joint("j1", "b", "c")), ("line 7", "two joints", "'j1'")),
+    (only(type_="hinge"), ("joint j", "type", "'hinge'")),
+    (simple('<joint name="j"/>', links=AB), ("joint j", "type", "revolute, continuous, prismatic, fixed")),
+    (simple('<joint name="j" type="fixed"><child link="b"/></joint>'), ("joint j", "no <parent")),
+    (simple('<joint name="j" type="fixed"><parent link="a"/></joint>'), ("joint j", "no <child")),
+    (simple(joint("j", "a", "b", inside='<parent link="b"/>')), ("joint j", "more than one <parent>")),
+    (simple(joint("j", "base", "b"), links=("base_x", "b")), ("joint j, <parent>", "base_x")),
+    (simple(joint("j", "a", "q"), links=AB), ("joint j, <child>", "no link", "'q'")),
+    (simple(ARM, joint("j2", "a", "c"), joint("j3", "b", "d"), joint("j4", "c", "d")), ("loop", "link d", "j3 and j4")),
+    (simple(ARM, joint("j2", "b", "a"), links=AB), ("loop", "no root")),
+    (simple(ARM, joint("j2", "c", "d"), joint("j3", "d", "c")), ("loop", "'c, d'")),
+    (simple(joint("j", "b", "b"), links=AB), ("loop", "'b'")),
+    (simple(ARM, joint("j2", "c", "d")), ("one root", "'a, c'")),
+    (simple(ARM, FIXED, GRIPPER, links=("a", "b", "c", "d", "tool0")), ("outermost joints: l, r", "robot.urdf#tool0")),
+    (simple(ARM, joint("j2", "a", "c"), links=("a", "b", "c")), ("branch", "such as b, c", "robot.urdf#b")),
+    (only(type_="floating"), ("joint j", "type", "'floating'")),
+    (only(type_="planar"), ("joint j", "'planar'")),
+    (only('<mimic joint="x"/>'), ("joint j", "mimics", "#LINK")),
+    (simple(joint("left joint", "a", "b"), links=AB), ("joint left joint", "letters", "Rename")),
+    (only('<origin xyz="0 1"/>'), ("joint j", "<origin xyz>", "'0 1'", "3 numbers")),
+    (only('<origin rpy="0 pi 0"/>'), ("joint j", "<origin rpy>", "'0 pi 0'")),
+    (only('<origin rpy="0 nan 1_0"/>'), ("<origin rpy>", "nan")),
+    (only('<origin xyz="0 0 1e999"/>'), ("<origin xyz>", "1e999")),
+    (only('<origin xyz="0 0 1e9"/>'), ("joint j", "<origin xyz>", "too large")),
+    (only('<origin xyz="0,0,1"/>'), ("<origin xyz>", "spaces between")),
+    (simple(ARM, FIXED.replace("</j", '<origin xyz=""/></j'), links=("a", "b", "tool0")), ("joint f", "<origin xyz>")),
+    (only("<origin/><origin/>"), ("joint j", "more than one <origin>")),
+    (only('<axis xyz="0 1"/>'), ("joint j", "<axis xyz>")),
+    (only('<axis xyz="0 0 0"/>'), ("joint j", "unit vector")),
+    (only('<axis xyz="0 3 -4"/>'), ("joint j", "unit vector", "0 0.6 -0.8")),
+    (only(type_="revolute"), ("joint j", "revolute", "<limit>", "continuous")),
+    (only(type_="prismatic"), ("joint j", "prismatic", "Give the joint's limits.")),
+    (limited('"-1"', "'low'"), ("joint turn", "<limit lower>", "'low'")),
+    (limited('"-1"', '"-1e16"'), ("joint turn", "<limit lower>", "too large")),
+    (limited('"-1"', '"0"').replace(b'upper="1"', b""), ("lower limit must be below", "lower 0.0, upper 0.0")),
+    (limited('velocity="1"', 'velocity="-1"'), ("joint turn", "velocity of a <limit> cannot be negative")),
+    (limited('velocity="1"', 'velocity="fast"'), ("joint turn", "<limit velocity>", "'fast'")),
+    (with_mass(""), ("line 3, link b", "<mass")),
+    (with_mass('<mass value="-1"/>'), ("link b", "negative", "-1")),
+    (with_mass('<mass value="1 kg"/>'), ("link b", "<mass value>", "'1 kg'", "one number")),
+]
 
 
-def test_robot_and_file_without_a_usable_name_are_refused(tmp_path: Path) -> None:
-    path = written(simple(ARM, links=AB, name="my robot"), tmp_path, "cell 3.urdf")
-    with pytest.raises(InputError, match=r"'my robot' and 'cell 3'.*letters, digits.*Rename the file"):
-        read_urdf(path)
-
-
-def test_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+def test_file_is_refused(tmp_path: Path) -> None:
+    for content, parts in REFUSED:
+        with refused(str(tmp_path), *parts, of=parts):
+            read(content, tmp_path)
+    for tip, parts in (("tool", ("no link of this name", "'tool'")), ("world", ("no joint moves", "root world"))):
+        with refused("robot.urdf", *parts, of=tip):
+            read(UR_LIKE, tmp_path, tip)
+    with refused("'my robot' and 'cell 3'", "Rename the file"):
+        read_urdf(written(simple(ARM, links=AB, name="my robot"), tmp_path, "cell 3.urdf"))
+    with refused("no such file"):
         read_urdf(tmp_path / "none.urdf")
 
 
@@ -441,34 +381,29 @@ def test_missing_file_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "tip"), [("ur_like", "tool0"), ("odd", "l5")])
-@pytest.mark.parametrize("scale", [1e-9, 1e-3, 0.3])
-@pytest.mark.parametrize("seed", range(3))
-def test_calibrated_file_has_the_poses_of_the_robot(
-    name: str, tip: str, scale: float, seed: int, tmp_path: Path
-) -> None:
-    robot = shifted(read(FILES[name], tmp_path), np.random.default_rng(seed), scale)
-    content, left_out = calibrated_urdf(FILES[name], robot)
-    check_poses(robot, content, tip, atol=1e-12, seed=seed)
-    assert left_out == []
-    assert content != FILES[name]
-    assert without_origins(content) == without_origins(FILES[name])
-    q = robot.random_configurations(10, np.random.default_rng(seed))
-    for actual, expected in zip(read(content, tmp_path).world_poses(q), robot.world_poses(q), strict=True):
-        assert_allclose(actual, expected, rtol=0, atol=1e-12)
+def test_calibrated_file_has_the_poses_of_the_robot(name: str, tip: str, tmp_path: Path) -> None:
+    for seed, scale in enumerate((1e-9, 1e-9, 1e-3, 1e-3, 0.3, 0.3)):
+        robot = shifted(read(FILES[name], tmp_path), np.random.default_rng(seed), scale)
+        content, left_out = calibrated_urdf(FILES[name], robot)
+        check_poses(robot, content, tip, atol=1e-12, seed=seed)
+        assert left_out == []
+        assert content != FILES[name]
+        assert without_origins(content) == without_origins(FILES[name])
+        q = robot.random_configurations(10, np.random.default_rng(seed))
+        for actual, expected in zip(read(content, tmp_path).world_poses(q), robot.world_poses(q), strict=True):
+            assert_allclose(actual, expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_each_parameter_changes_only_its_own_joint(name: str, tmp_path: Path) -> None:
-    content = FILES[name]
-    nominal = read(content, tmp_path)
-    for number, own in enumerate(nominal.joints, 1):
-        for parameter in [p for p in nominal.parameters if p.endswith(f"_{number}")]:
-            robot = nominal.with_values({parameter: nominal.values[parameter] + 1e-3})
-            changed, _ = calibrated_urdf(content, robot)
-            again = read(changed, tmp_path)
-            others = [j for j in nominal.joints if j.name != own.name]
-            assert [j for j in again.joints if j.name != own.name] == others, parameter
-            check_poses(robot, changed, "tool0" if name == "ur_like" else "l5", atol=1e-12)
+def test_each_parameter_changes_only_its_own_joint(tmp_path: Path) -> None:
+    for name, tip in (("ur_like", "tool0"), ("odd", "l5")):
+        nominal = read(FILES[name], tmp_path)
+        for number, own in enumerate(nominal.joints, 1):
+            for parameter in [p for p in nominal.parameters if p.endswith(f"_{number}")]:
+                robot = nominal.with_values({parameter: nominal.values[parameter] + 1e-3})
+                changed, _ = calibrated_urdf(FILES[name], robot)
+                others = [j for j in nominal.joints if j.name != own.name]
+                assert [j for j in read(changed, tmp_path).joints if j.name != own.name] == others, parameter
+                check_poses(robot, changed, tip, atol=1e-12)
 
 
 def test_unchanged_robot_leaves_the_file_alone(tmp_path: Path) -> None:
@@ -488,12 +423,9 @@ def edited(inside: str, values: dict[str, float], folder: Path, type_: str = "co
     return changed.decode().split('<child link="b"/>')[1].split("</joint>")[0]
 
 
-AXIS = '<axis xyz="0 0 1"/>'
-
-
-@pytest.mark.parametrize(
-    ("before", "values", "after"),
-    [
+def test_origin_is_edited_in_place(tmp_path: Path) -> None:
+    axis = '<axis xyz="0 0 1"/>'
+    for before, values, after in (
         ('<origin xyz="1 2.0 3e0" rpy="0 0 0"/>', {"y_1": 2.5}, '<origin xyz="1 2.5 3e0" rpy="0 0 0"/>'),
         ("<origin rpy='0  1\t0' xyz='1 2 3' />", {"x_1": 0.0}, "<origin rpy='0  1\t0' xyz='0.0 2 3' />"),
         ('<origin xyz="0 0 1"></origin>', {"theta_offset_1": 0.5}, '<origin xyz="0 0 1" rpy="0.0 0.0 0.5"></origin>'),
@@ -504,27 +436,20 @@ AXIS = '<axis xyz="0 0 1"/>'
         ('<origin frame="xyz=\'9\'" xyz="0 0 0"/>', {"x_1": 1.0}, '<origin frame="xyz=\'9\'" xyz="1.0 0 0"/>'),
         ('<!--<origin/>--><origin xyz="0 0 0"/>', {"x_1": 1.0}, '<!--<origin/>--><origin xyz="1.0 0 0"/>'),
         ('<origin rpy="0 1.5708 0" xyz="0 0 0"/>', {"x_1": 1.0}, '<origin rpy="0 1.5708 0" xyz="1.0 0 0"/>'),
-    ],
-)  # fmt: skip
-def test_origin_is_edited_in_place(before: str, values: dict[str, float], after: str, tmp_path: Path) -> None:
-    assert edited(before + AXIS, values, tmp_path) == after + AXIS
-
-
-def test_missing_origin_is_put_behind_the_start_tag(tmp_path: Path) -> None:
-    content = simple(
-        "<joint name='j' note='>' type='continuous'\n><parent link='a'/><child link='b'/></joint>", links=AB
-    )
-    robot = read(content, tmp_path).with_values({"x_1": 0.5})
-    changed, _ = calibrated_urdf(content, robot)
-    assert changed == content.replace(b"'\n>", b'\'\n><origin xyz="0.5 0.0 0.0"/>')
+    ):
+        assert edited(before + axis, values, tmp_path) == after + axis
+    of_two_lines = "<joint name='j' note='>' type='continuous'\n><parent link='a'/><child link='b'/></joint>"
+    content = simple(of_two_lines, links=AB)
+    changed, _ = calibrated_urdf(content, read(content, tmp_path).with_values({"x_1": 0.5}))
+    assert changed == content.replace(b"'\n>", b'\'\n><origin xyz="0.5 0.0 0.0"/>')  # behind the start tag
 
 
 def test_right_angle_stays_a_right_angle(tmp_path: Path) -> None:
-    for pitch, sign in ((math.pi / 2, 1), (-math.pi / 2, -1)):
+    for pitch in (math.pi / 2, -math.pi / 2):
         inside = f'<origin xyz="0 0 0" rpy="0.25 {pitch!r} 0.5"/><axis xyz="1 0 0"/>'
         after = edited(inside, {"theta_offset_1": 0.125}, tmp_path)
         found = re.findall(r'rpy="(\S+) (\S+) (\S+)"', after)[0]
-        assert_allclose([float(v) for v in found], [0.375, sign * math.pi / 2, 0.5], rtol=0, atol=1e-15)
+        assert_allclose([float(v) for v in found], [0.375, pitch, 0.5], rtol=0, atol=1e-15)
 
 
 def test_byte_places_hold_in_long_files_and_behind_a_mark(tmp_path: Path) -> None:
@@ -543,40 +468,27 @@ def test_what_a_urdf_cannot_hold_is_said(tmp_path: Path) -> None:
     content, left_out = calibrated_urdf(UR_LIKE, robot)
     assert content == UR_LIKE
     gains, base, targets = left_out
-    assert "joint effect gain" in gains
-    assert gains.endswith("gain_2, gain_4.")
-    assert "base stands in the instrument's frame" in base
-    assert base.endswith("base_quaternion, base_x.")
-    assert "targets" in targets
-    assert targets.endswith("ball.")
+    assert re.search(r"joint effect gain.*gain_2, gain_4\.$", gains)
+    assert re.search(r"base stands in the instrument's frame.*base_quaternion, base_x\.$", base)
+    assert re.search(r"targets.*ball\.$", targets)
     assert urdf_text(robot)[1][:3] == left_out
     assert calibrated_urdf(UR_LIKE, plain.with_effects(["gain"]))[1] == []
 
 
-@pytest.mark.parametrize(
-    ("content", "parts"),
-    [
-        (simple(ARM, links=AB), ("no joint wrist_1_joint",)),
-        (UR_LIKE.replace(b'"elbow_joint"', b'"elbow"'), ("other joints move", "elbow,", "elbow_joint")),
-        (UR_LIKE.replace(b"0.39225", b"0.39226"), ("z of joint wrist_1_joint differs", "0.39226", "0.39225")),
-        (UR_LIKE.replace(b'"0.1 0 0.5"', b'"0.1 0 0.6"'), ("z of joint shoulder_pan_joint differs",)),
-        (UR_LIKE.replace(b'"0 0 1"/>', b'"0 0 -1"/>', 1), ("axis_z of joint shoulder_pan_joint differs",)),
-        (
-            UR_LIKE.replace(b'"elbow_joint" type="revolute"', b'"elbow_joint" type="prismatic"'),
-            ("joint elbow_joint is prismatic",),
-        ),
-    ],
-)
-def test_another_robots_file_is_not_calibrated(content: bytes, parts: tuple[str, ...], tmp_path: Path) -> None:
+def test_another_robots_file_is_not_calibrated(tmp_path: Path) -> None:
     robot = read(UR_LIKE, tmp_path)
-    with pytest.raises(InputError) as refusal:
-        calibrated_urdf(content, robot)
-    for part in ("the URDF to calibrate", "not the one this robot was read from", "Give the URDF", *parts):
-        assert part in str(refusal.value)
-
-
-def test_robot_of_another_convention_has_no_file_to_calibrate() -> None:
-    with pytest.raises(InputError, match=r"irb120 is of convention modified-hayati.*a new URDF can be written"):
+    slides = UR_LIKE.replace(b'"elbow_joint" type="revolute"', b'"elbow_joint" type="prismatic"')
+    for content, said in (
+        (simple(ARM, links=AB), "no joint wrist_1_joint"),
+        (UR_LIKE.replace(b'"elbow_joint"', b'"elbow"'), "other joints move"),
+        (UR_LIKE.replace(b"0.39225", b"0.39226"), "z of joint wrist_1_joint differs"),
+        (UR_LIKE.replace(b'"0.1 0 0.5"', b'"0.1 0 0.6"'), "z of joint shoulder_pan_joint differs"),
+        (UR_LIKE.replace(b'"0 0 1"/>', b'"0 0 -1"/>', 1), "axis_z of joint shoulder_pan_joint differs"),
+        (slides, "joint elbow_joint is prismatic"),
+    ):
+        with refused("not the one this robot was read from", said, of=said):
+            calibrated_urdf(content, robot)
+    with refused("irb120 is of convention modified-hayati", "a new URDF can be written"):
         calibrated_urdf(UR_LIKE, load_robot("irb120"))
 
 
@@ -680,49 +592,28 @@ def check_new_file(robot: Robot, folder: Path) -> None:
 
 @pytest.mark.parametrize("robot_id", ARMS)
 def test_new_file_of_library_robot(robot_id: str, tmp_path: Path) -> None:
-    robot = load_robot(robot_id)
-    check_new_file(robot, tmp_path)
-    check_new_file(shifted(robot, np.random.default_rng(1), 1e-3), tmp_path)
+    for robot in (load_robot(robot_id), shifted(load_robot(robot_id), np.random.default_rng(1), 1e-3)):
+        check_new_file(robot, tmp_path)
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)
-@pytest.mark.parametrize("seed", range(3))
-def test_new_file_of_robot_of_any_convention(convention: Convention, seed: int, tmp_path: Path) -> None:
-    rng = np.random.default_rng(seed)
+def test_new_file_of_robot_of_any_convention(convention: Convention, tmp_path: Path) -> None:
     kinds: tuple[JointKind, ...] = ("revolute", "prismatic", "revolute", "revolute", "prismatic")
-    joints = []
-    for number, kind in enumerate(kinds, 1):
-        row = {column: float(rng.uniform(-0.5, 0.5)) for column in convention.row_units(kind)}
-        if "axis_x" in row:
-            row |= {"axis_x": 0.36, "axis_y": -0.48, "axis_z": 0.8}
-        joints.append(Joint(f"J{number}", kind, row, (-0.5, 0.25) if number < 4 or kind == "prismatic" else None))
+    limits = ((-0.5, 0.25), (-0.5, 0.25), (-0.5, 0.25), None, (-0.5, 0.25))
     masses = (LinkMass(2, 1.5, (0.1, 0.2, -0.3)), LinkMass(5, 0.5, (0.0, 0.0, 0.1)))
-    flange = Transform((0.1, 0.0, 0.2), (0.1, -0.7, 0.1, 0.7))
-    robot = Robot("made", "", "", convention.name, tuple(joints), flange, masses)
-    check_new_file(shifted(robot, rng, 0.1), tmp_path)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        robot = random_robot(convention, (), rng, kinds)
+        joints = tuple(replace(j, limits=own) for j, own in zip(robot.joints, limits, strict=True))
+        check_new_file(shifted(replace(robot, joints=joints, masses=masses), rng, 0.1), tmp_path)
 
 
-def test_new_file_says_what_it_does_not_know() -> None:
-    text, left_out = urdf_text(with_speeds(load_robot("irb120")))
-    assert left_out == [
-        "Effort and velocity limits are not known and stand as 0.",
-        "Inertia tensors are not written and stand as 0.",
-    ]
-    assert '<axis xyz="0.0 0.0 1.0"/>' in text
-    assert 'effort="0" velocity="0"' in text
-
-
-def with_speeds(robot: Robot, *speeds: float | None) -> Robot:
-    """Return a robot whose joints have these speeds at 100 %, and none beyond."""
-    pairs = zip_longest(robot.joints, speeds)
-    return replace(robot, joints=tuple(replace(joint, max_speed=speed) for joint, speed in pairs))
-
-
-def test_velocities_of_limits_are_the_speeds_of_the_joints(tmp_path: Path) -> None:
+def test_velocities_of_limits_are_the_speeds_of_the_joints_and_what_is_not_known_is_said(tmp_path: Path) -> None:
     robot = load_robot("irb120")
     free = replace(robot, joints=(replace(robot.joints[0], limits=None), *robot.joints[1:]))
     path = tmp_path / "arm.urdf"
     for made, said in (
+        (with_speeds(robot), "Effort and velocity limits are not known and stand as 0."),
         (free, "Effort limits are not known and stand as 0."),
         (
             with_speeds(free, 1.5, None, 2.5, 3.5, 4.5),
@@ -730,7 +621,7 @@ def test_velocities_of_limits_are_the_speeds_of_the_joints(tmp_path: Path) -> No
         ),
     ):
         text, left_out = urdf_text(made)
-        assert left_out[0] == said
+        assert left_out == [said, "Inertia tensors are not written and stand as 0."]
         path.write_text(text)
         again = read_urdf(path)
         assert [(joint.limits, joint.max_speed) for joint in again.joints] == [
@@ -740,20 +631,17 @@ def test_velocities_of_limits_are_the_speeds_of_the_joints(tmp_path: Path) -> No
         assert [joint.max_speed for joint in saved.joints] == pytest.approx([joint.max_speed for joint in made.joints])
 
 
-@pytest.mark.parametrize(
-    ("velocity", "speed"),
-    [
-        ('velocity="3.15"', 3.15),
-        ('velocity="0"', None),
-        ('velocity="0.1"', None),
-        ('velocity="1e6"', None),
-        ("", None),
-    ],
-)
-def test_a_velocity_that_no_joint_has_is_unknown(velocity: str, speed: float | None, tmp_path: Path) -> None:
-    path = tmp_path / "arm.urdf"
-    path.write_bytes(simple(TURN.replace('velocity="1"', velocity), links=AB))
-    assert read_urdf(path).joints[0].max_speed == speed
+def with_speeds(robot: Robot, *speeds: float | None) -> Robot:
+    """Return a robot whose joints have these speeds at 100 %, and none beyond."""
+    pairs = zip_longest(robot.joints, speeds)
+    return replace(robot, joints=tuple(replace(joint, max_speed=speed) for joint, speed in pairs))
+
+
+def test_a_velocity_that_no_joint_has_is_unknown(tmp_path: Path) -> None:
+    for velocity, speed in (("3.15", 3.15), ("0", None), ("0.1", None), ("1e6", None)):
+        path = written(limited('velocity="1"', f'velocity="{velocity}"'), tmp_path)
+        assert read_urdf(path).joints[0].max_speed == speed, velocity
+    assert read(limited('velocity="1"', ""), tmp_path).joints[0].max_speed is None
 
 
 def test_two_masses_of_one_link_become_one(tmp_path: Path) -> None:
@@ -764,16 +652,11 @@ def test_two_masses_of_one_link_become_one(tmp_path: Path) -> None:
     assert_allclose((mass.mass, *mass.cog), (4.0, 0.025, 0.15, 0.2), rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("joints", "parts"),
-    [
-        ((Joint("Z", "prismatic", {}),), ("arm, joint Z", "limits of a prismatic joint", "robot file")),
-        ((Joint("A", "revolute", {}), Joint("A", "revolute", {})), ("arm", "two joints of one name", "'A'")),
+def test_new_file_is_refused() -> None:
+    for joints, parts in (
+        ((Joint("Z", "prismatic", {}),), ("arm, joint Z", "limits of a prismatic joint")),
+        ((Joint("A", "revolute", {}), Joint("A", "revolute", {})), ("two joints of one name", "'A'")),
         ((Joint("tool0_joint", "revolute", {}),), ("two joints of one name", "'tool0_joint'")),
-    ],
-)
-def test_new_file_is_refused(joints: tuple[Joint, ...], parts: tuple[str, ...]) -> None:
-    with pytest.raises(InputError) as refusal:
-        urdf_text(Robot("arm", "", "", "standard-dh", joints))
-    for part in parts:
-        assert part in str(refusal.value)
+    ):
+        with refused(*parts, of=parts):
+            urdf_text(Robot("arm", "", "", "standard-dh", joints))

@@ -5,16 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.engine.robot.refusing import refused
 
 import truearm
-from truearm.engine.base.errors import InputError
-from truearm.engine.robot.library import close_names, library, load_robot
+from truearm.engine.robot.library import close_names, library, load_robot, urdf_source
 from truearm.engine.robot.library.wider_limits import wider_limits_notices
-
-
-def test_the_library_has_arms_of_many_makers() -> None:
-    assert len(library()) >= 45
-    assert len({load_robot(name).maker for name in library()}) >= 12
+from truearm.engine.robot.urdf_writing import urdf_text
 
 
 def test_the_list_tells_maker_reach_joints_and_whether_the_controller_is_known() -> None:
@@ -41,9 +37,8 @@ def test_the_list_tells_maker_reach_joints_and_whether_the_controller_is_known()
     assert (one["maker"], one["reach_mm"], one["reach_from"], one["controller_known"]) == (None, None, None, False)
 
 
-@pytest.mark.parametrize(
-    ("text", "offered"),
-    [
+def test_a_close_name_is_refused_and_all_it_may_be_are_offered() -> None:
+    for text, offered in (
         ("irb1200", ["irb1200_5_0.9", "irb1200_7_0.7"]),
         ("IRB 1200", ["irb1200_5_0.9", "irb1200_7_0.7"]),
         ("UR-10e", ["ur10e"]),
@@ -55,37 +50,28 @@ def test_the_list_tells_maker_reach_joints_and_whether_the_controller_is_known()
         ("Stäubli TX2-60L", ["tx2_60l", "tx2_60"]),
         ("cell/ur5e", ["ur5e", "ur5"]),
         ("zzz", []),
-    ],
-)
-def test_a_close_name_is_refused_and_all_it_may_be_are_offered(text: str, offered: list[str]) -> None:
-    assert close_names(text)[: len(offered)] == offered
-    with pytest.raises(InputError) as refusal:
-        load_robot(text)
-    told = str(refusal.value)
-    for name in offered:
-        assert f"{name} ({load_robot(name).title})" in told
-    if not offered:
-        assert "Run 'truearm robots'" in told
-
-
-def test_many_close_names_are_not_all_offered() -> None:
+    ):
+        assert close_names(text)[: len(offered)] == offered
+        titles = [f"{name} ({load_robot(name).title})" for name in offered]
+        with refused(*titles or ["Run 'truearm robots'"], of=text):
+            load_robot(text)
     assert len(close_names("ur")) == 8
 
 
-@pytest.mark.parametrize("name", ["ur5e.yaml", "LR Mate 200iD/7L.yaml"])
-def test_a_file_that_is_not_there_is_a_file(name: str) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        load_robot(name)
+def test_a_file_or_a_folder_that_is_not_there_is_said_to_be_so_and_no_robot_too(tmp_path: Path) -> None:
+    for given, said in (
+        ("ur5e.yaml", "no such file"),
+        ("LR Mate 200iD/7L.yaml", "no such file"),
+        (tmp_path / "ur5e", "no such file"),
+        ("", "robot: no robot is given"),
+        (" ", "robot: no robot is given"),
+    ):
+        with refused(said, of=given):
+            load_robot(given)
 
 
-def test_a_name_in_a_folder_that_exists_is_a_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        load_robot(tmp_path / "ur5e")
-
-
-@pytest.mark.parametrize(
-    ("given", "found"),
-    [
+def test_the_list_is_narrowed() -> None:
+    narrowed: list[tuple[dict[str, Any], list[str]]] = [
         ({"text": "irb 1200"}, ["irb1200_5_0.9", "irb1200_7_0.7"]),
         ({"text": "fanuc 200ID"}, ["lrmate200id"]),
         ({"text": "kr5"}, ["kr5"]),
@@ -93,16 +79,15 @@ def test_a_name_in_a_folder_that_exists_is_a_file(tmp_path: Path) -> None:
         ({"maker": "Universal", "axes": 6, "text": "5"}, ["ur5", "ur5e"]),
         ({"maker": "UR", "text": "10"}, ["ur10", "ur10e"]),
         ({"axes": 3}, ["li3"]),
-    ],
-)
-def test_the_list_is_narrowed(given: dict[str, Any], found: list[str]) -> None:
-    assert [robot.name for robot in truearm.robots(**given).robots] == found
+    ]
+    for given, found in narrowed:
+        assert [robot.name for robot in truearm.robots(**given).robots] == found, given
 
 
 @pytest.mark.parametrize(
     ("given", "parameter", "words"),
     [
-        ({"text": "irb12O"}, "text", "none of these robots is called so; got 'irb12O'. Did you mean irb120"),
+        ({"text": "irb12O"}, "text", "Did you mean irb120"),
         ({"text": ""}, "text", "Run 'truearm robots' for all"),
         ({"text": 5}, "text", "a name belongs here"),
         ({"maker": "Yaskava"}, "maker", "Did you mean Yaskawa"),
@@ -113,10 +98,8 @@ def test_the_list_is_narrowed(given: dict[str, Any], found: list[str]) -> None:
     ],
 )
 def test_a_list_of_none_is_refused(given: dict[str, Any], parameter: str, words: str) -> None:
-    with pytest.raises(InputError) as refusal:
+    with refused(words, parameter=parameter):
         truearm.robots(**given)
-    assert refusal.value.parameter == parameter
-    assert words in str(refusal.value)
 
 
 def test_limits_beyond_those_of_the_library_are_told() -> None:
@@ -130,3 +113,39 @@ def test_limits_beyond_those_of_the_library_are_told() -> None:
     assert not wider_limits_notices(replace(wider, name="mine"))
     assert not wider_limits_notices(replace(wider, joints=wider.joints[:5]))
     assert not wider_limits_notices(replace(known, joints=(replace(first, limits=(-2.0, 2.0)), second, *others)))
+
+
+def test_what_is_a_urdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("there.urdf#old.urdf").touch()
+    Path("there.urdf#note.yaml").touch()
+    for text, source in (
+        ("irb120", None),
+        ("my.yaml", None),
+        ("my#1.yaml", None),
+        ("arm.urdf", ("arm.urdf", None)),
+        ("arm.URDF", ("arm.URDF", None)),
+        ("arm.xml", ("arm.xml", None)),
+        ("arm.urdf.xacro#tip", ("arm.urdf.xacro", "tip")),
+        ("arm.urdf#", ("arm.urdf", None)),
+        ("cell#3/arm#2.urdf", ("cell#3/arm#2.urdf", None)),
+        ("cell#3/arm#2.urdf#tip", ("cell#3/arm#2.urdf", "tip")),
+        ("arm.urdf#tip#2", ("arm.urdf", "tip#2")),
+        ("arm.urdf#old.urdf#tip", ("arm.urdf#old.urdf", "tip")),
+        ("there.urdf#old.urdf", ("there.urdf#old.urdf", None)),
+        ("there.urdf#note.yaml", None),
+    ):
+        expected = source and (Path(source[0]), source[1])
+        assert urdf_source(text) == expected, text
+        assert urdf_source(Path(text)) == expected, text
+
+
+def test_a_path_with_a_hash_is_a_path(tmp_path: Path) -> None:
+    folder = tmp_path / "cell #3"
+    folder.mkdir()
+    path = folder / "arm #2.urdf"
+    path.write_text(urdf_text(load_robot("li3"))[0])
+    for text in (path, f"{path}#tool0"):
+        assert len(load_robot(text).joints) == 3
+    with refused("there is no link of this name; got 'tool'"):
+        load_robot(f"{path}#tool")

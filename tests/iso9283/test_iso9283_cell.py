@@ -18,16 +18,9 @@ from truearm.iso9283.planning.criteria import TESTS
 from truearm.iso9283.planning.programs import StatedCell, stated_cell
 from truearm.iso9283.planning.result import Iso9283Plan
 
-CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
 CELL = "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"
 #: Where the cube's near faces are, and where nothing of the arm ever is.
 IN_THE_WAY, ASIDE = "keep_out: {post: {x: [300, 320], z: [0, 400]}}\n", "keep_out: {wall: {x: [-2000, -600]}}\n"
-
-
-@pytest.fixture
-def cube(tmp_path: Path) -> Path:
-    (tmp_path / "cube.yaml").write_text(CUBE)
-    return tmp_path / "cube.yaml"
 
 
 def rules(folder: Path, text: str) -> Constraints:
@@ -78,12 +71,6 @@ def test_a_cube_that_is_not_clear_is_refused(
         planned(cube, constraints=rules(tmp_path, text), **more)
     assert refusal.value.parameter == parameter
     assert words in str(refusal.value)
-
-
-def test_a_file_of_constraints_that_is_none_is_refused(cube: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file") as refusal:
-        planned(cube, constraints=tmp_path / "none.yaml")
-    assert refusal.value.parameter == "constraints"
 
 
 def test_ways_between_clear_poses_that_are_not_clear_are_named(cube: Path, tmp_path: Path) -> None:

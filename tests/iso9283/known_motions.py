@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from tests.moving_tip import ALONG, CENTRE, HERE, TRACKER, along, duration_of, plan_of, ramp, samples_of, times
 
 from truearm.engine.base.errors import Notice
@@ -28,7 +29,7 @@ def runs(*, rate: float = 100.0, cycles: int = 5, sigma: float = 0.02e-3, shape:
     return samples_of("AT", shape, [(k + 1, t, p + rng.normal(0.0, sigma, p.shape)) for k in range(cycles)])
 
 
-def part(samples: Samples, kept: Array) -> Samples:
+def part(samples: Samples, kept: NDArray[np.bool_]) -> Samples:
     """Return some of the rows of one test at one place."""
     test, place = samples.criterion.names[0], samples.place.names[0]
     rows = [(k, kept & (samples.cycle == k)) for k in sorted({*samples.cycle.tolist()})]

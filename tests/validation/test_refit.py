@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -62,6 +63,9 @@ def test_an_instrument_that_was_carried_elsewhere_is_told_and_found() -> None:
     (notice,) = validate(robot, there).warnings
     assert (notice.code, notice.level) == ("base-moved", "error")
     assert "`refit=base`" in notice.message
+    assert re.search(
+        r"moved by \d+(\.\d+)? mm at their middle and turned by 4\d(\.\d+)? deg as a whole", notice.message
+    )
     found = validate(robot, there, refit="base")
     assert found.warnings == ()
     assert found.position is not None
@@ -83,6 +87,7 @@ def test_a_tool_that_was_mounted_anew_is_told_and_found_alone(angle: float) -> N
     (notice,) = validate(robot, moved).warnings
     assert notice.code == "tool-moved"
     assert "`refit=tool`" in notice.message
+    assert "mm at the middle of its targets and turned by" in notice.message
     found = validate(robot, moved, refit="tool")
     assert found.warnings == ()
     assert found.position is not None

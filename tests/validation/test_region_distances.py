@@ -150,7 +150,7 @@ def test_the_page_draws_every_error_over_every_distance(run: Calibration) -> Non
         assert mean["y"] == pytest.approx([1e3 * span.mean for span in spans for _ in range(2)], rel=6e-4)
         assert drawn[f"error-over-{name}"]["layout"]["xaxis"]["rangemode"] == "tozero"
     page = validation_html(judged)
-    assert f"On {judged.errors.configurations} configurations" in judged.lines()[0]
+    assert f"On {judged.errors.configurations} configurations" in judged.lines()[1]
     assert "knows 30 training configurations" in page
     span = found.spans(found.tip)[1]
     row = f"{significant(1e3 * span.low, 3, 1)} to {significant(1e3 * span.high, 3, 1)}"

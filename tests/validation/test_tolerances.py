@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -118,13 +119,14 @@ def test_what_no_tolerance_is_is_refused() -> None:
     for call in (lambda: tolerance_of(0.0, 0.0, 0.0), lambda: errors_of_tolerance(1e-3, 0.0, -0.01)):
         with pytest.raises(InputError, match=r"a hole needs a depth.*above 0 mm"):
             call()
-    for given, parameter, said in (
-        ((0.0,), "depth", "a hole needs a depth"),
-        (([0.05] * 5,), "depth", "6 lengths, or one for all"),
-        ((0.05, -1e-3), "lean", "out of range"),
-        ((0.05, None, -1e-3), "position", "out of range"),
-        ((0.05,), "robot", "not described by joint errors"),
-    ):
+    cases: list[tuple[dict[str, Any], str, str]] = [
+        ({"depth": 0.0}, "depth", "a hole needs a depth"),
+        ({"depth": [0.05] * 5}, "depth", "6 lengths, or one for all"),
+        ({"lean": -1e-3}, "lean", "out of range"),
+        ({"position": -1e-3}, "position", "out of range"),
+        ({}, "robot", "not described by joint errors"),
+    ]
+    for given, parameter, said in cases:
         with pytest.raises(InputError, match=said) as refusal:
-            truearm.tolerance("kr5", *given[:1], **dict(zip(("lean", "position"), given[1:], strict=False)))
+            truearm.tolerance("kr5", **{"depth": 0.05, **given})
         assert refusal.value.parameter == parameter

@@ -57,11 +57,7 @@ def test_joint_positions_of_the_controller_stay_the_controllers(tmp_path: Path) 
     ("name", "value", "words"),
     [
         ("apart", "20mm,0.02mm", r"run into each other; got '20 mm'; allowed: 25 mm, the diameter of the ball"),
-        (
-            "apart",
-            "200,0.02",
-            r"no unit that fits is given; got '200'; allowed: 200mm or .*write 200mm,0\.02mm",
-        ),
+        ("apart", "200,0.02", r"no unit that fits is given; got '200'; allowed: 200mm or .*write 200mm,0\.02mm"),
         ("apart", "200mm,0.02", r"no unit that fits is given; got '0\.02'"),
         ("apart", "200mm", r"a distance and its standard deviation belong here; got '200mm'; allowed: 200mm,0\.02mm"),
         ("apart", "200mm,0mm", r"the number is too small to be plausible"),

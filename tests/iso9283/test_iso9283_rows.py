@@ -58,8 +58,7 @@ def campaign(seed: int = 1, tests: tuple[str, ...] = TESTS) -> tuple[Performance
             for cycle in range(1, test.cycles + 1)
         ]
     plan = dataclasses.replace(
-        plan,
-        tests=tuple(t if t.id in ("AP", "AD") else dataclasses.replace(t, velocities=(1.0,)) for t in plan.tests),
+        plan, tests=tuple(t if t.id in ("AP", "AD") else dataclasses.replace(t, velocities=(1.0,)) for t in plan.tests)
     )
     criterion, robot, pose, cycle, approach, velocity, time = zip(*keys, strict=True)
     n = len(keys)

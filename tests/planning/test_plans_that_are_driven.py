@@ -20,8 +20,12 @@ from truearm.engine.motion.collisions import CollisionCheck
 from truearm.engine.motion.constraints import Constraints
 from truearm.engine.motion.tour import Tour
 from truearm.engine.motion.touring import cell_notices
+from truearm.engine.motion.ways import WayFinder
+from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.truths import carrying_targets
+from truearm.planning.choosing import Reachable, chosen_with_ways
 from truearm.planning.result import Plan
 
 UNITS = {"units": {"length": "mm", "angle": "deg"}}
@@ -47,6 +51,17 @@ def window(robot: Robot) -> np.ndarray:
         if joint.kind == "revolute" and limits[k, 0] <= -np.pi and limits[k, 1] >= np.pi:
             limits[k] = -np.pi, np.pi
     return limits
+
+
+def rules(**entries: object) -> Constraints:
+    return Constraints.model_validate({"truearm": "truearm-constraints/1", **UNITS, **entries})
+
+
+def toured(**given: Any) -> tuple[Plan, Tour]:
+    """Plan for an IRB 120, and return its tour, too."""
+    planned = truearm.plan("irb120", **{"poses": 10, "candidates": 60, **given})
+    assert planned.tour is not None
+    return planned, planned.tour
 
 
 def a_quarter(robot: Robot) -> Constraints:
@@ -374,12 +389,62 @@ def test_a_plan_says_where_links_beside_their_lines_are_kept_clear() -> None:
     assert [one["code"] for one in planned.summary()["warnings"]] == ["tool-assumed", "links-beside"]
 
 
-def rules(**entries: object) -> Constraints:
-    return Constraints.model_validate({"truearm": "truearm-constraints/1", **UNITS, **entries})
+HOME = np.deg2rad([90.0, 60, -30, 0, 0, 0])
 
 
-def toured(**given: Any) -> tuple[Plan, Tour]:
-    """Plan for an IRB 120, and return its tour, too."""
-    planned = truearm.plan("irb120", **{"poses": 10, "candidates": 60, **given})
-    assert planned.tour is not None
-    return planned, planned.tour
+@pytest.fixture(scope="module")
+def walled() -> Reachable:
+    """An arm on one side of a wall with a gap too narrow for it, and candidates on both sides."""
+    robot = carrying_targets(load_robot("irb120"))
+    inf = np.inf
+    walls = {
+        "front": (np.array([0.08, -0.02, -inf]), np.array([5.0, 0.02, inf])),
+        "rear": (np.array([-5.0, -0.02, -inf]), np.array([-0.08, 0.02, inf])),
+    }
+    check = CollisionCheck(robot, Cell(-1.0, boxes_of(walls), 0.02))
+    low, high = np.array([joint.range for joint in robot.joints]).T
+    drawn = np.random.default_rng(1).uniform(low, high, (400, 6))
+    clear = drawn[check.room(drawn) >= check.need]
+    return Reachable(WayFinder(check, HOME, low, high), clear, clear)
+
+
+def test_what_has_no_way_is_left_out_and_the_choices_are_bounded(walled: Reachable) -> None:
+    """A choice that prefers what has no way is asked a few times, then only what is known to have one counts."""
+    finder, q = walled.finder, walled.joints
+    far = np.argsort(finder.check.arm.robot.forward(q)[0][:, 1])  # beyond the wall first
+    rounds: list[int] = []
+    said: list[str] = []
+
+    def choose(left: np.ndarray) -> np.ndarray:
+        rounds.append(len(left))
+        return far[np.isin(far, left)][:3]
+
+    reachable = Reachable(finder, q, q)
+    chosen, cost = chosen_with_ways(choose, np.arange(len(q)), reachable, 3, said.append)
+    assert len(chosen) == 3
+    assert len(rounds) == 4
+    assert sorted(rounds, reverse=True) == rounds
+    assert reachable.known[chosen].all()
+    assert (finder.check.arm.robot.forward(q[chosen])[0][:, 1] > 0.0).all()
+    assert all(way is not None for way in finder.home_from(q[chosen]))
+    assert cost["ways"] >= 9
+    assert cost["ways"] + cost.get("straight ways", 0) + rounds[-1] == len(q)
+    assert [words for words in said if words.startswith("looking for ways that keep clear, round ")][-1][-1] == "3"
+    assert any(words.endswith("as there was no way to 3") for words in said)
+
+
+def test_too_few_with_ways_are_refused_with_what_is_in_the_way(walled: Reachable) -> None:
+    q = walled.joints
+    beyond = np.flatnonzero(walled.finder.check.arm.robot.forward(q)[0][:, 1] < -0.1)[:12]
+    with pytest.raises(
+        InputError, match=r"have a way.*0 of 12; on the straight ones most often .*near the box '(front|rear)"
+    ) as it:
+        chosen_with_ways(lambda left: left[:4], beyond, Reachable(walled.finder, q, q), 4, lambda _: None)
+    assert it.value.parameter == "home"
+    assert "4 or more" in str(it.value)
+
+
+def test_without_anything_to_keep_clear_of_the_first_choice_counts() -> None:
+    chosen, cost = chosen_with_ways(lambda left: left[:2], np.arange(5), None, 2, lambda _: None)
+    assert chosen.tolist() == [0, 1]
+    assert cost == {}

@@ -89,7 +89,7 @@ def read_by_bars(twin: Twin, joints: Array, centre: Array) -> Dataset:
     count = len(joints)
     rows = [(k, target) for k in range(count) for target in (0, 1) if k or not target]
     places = [twin.target_frames(q) for q in joints]
-    lengths = [np.linalg.norm(places[k][str(target + 1)][:3, 3] - centre) for k, target in rows]
+    lengths = [float(np.linalg.norm(places[k][str(target + 1)][:3, 3] - centre)) for k, target in rows]
     lengths[0] = np.nan  # no bar is as short as that
     lengths[7] = np.nan
     return Dataset(

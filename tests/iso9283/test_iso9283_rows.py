@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -222,32 +221,27 @@ def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> Att
     if isinstance(column, Names):
         texts = [column.names[code] for code in column.code]
         texts[row] = str(value)
-        new: dict[str, Any] = {name: Names.of(texts)}
-        return dataclasses.replace(read, **new)
-    column = column.copy()
-    column[row] = value
-    new = {name: column}
+        column = Names.of(texts)
+    else:
+        column = column.copy()
+        column[row] = value
+    new: dict[str, Any] = {name: column}
     return dataclasses.replace(read, **new)
 
 
 @pytest.mark.parametrize(
-    ("change", "text"),
+    ("column", "value", "text"),
     [
-        (lambda r: changed(r, "velocity", 3, 0.01), "line 5, column velocity: 1 row of the test AP"),
-        (lambda r: changed(r, "velocity", 3, 0.995), "99.5 %"),
-        (lambda r: changed(r, "load", 3, 0.5), "line 5, column load: 1 row of the test AP"),
-        (
-            lambda r: changed(r, "robot", 3, "irb12O"),
-            "line 5, column robot: the robot is named in some rows of the test AP and in others not",
-        ),
+        ("velocity", 0.01, "line 5, column velocity: 1 row of the test AP"),
+        ("velocity", 0.995, "99.5 %"),
+        ("load", 0.5, "line 5, column load: 1 row of the test AP"),
+        ("robot", "irb12O", "line 5, column robot: the robot is named in some rows of the test AP and in others not"),
     ],
 )
-def test_rows_under_conditions_that_were_not_planned_are_refused(
-    change: Callable[[AttainedPoses], AttainedPoses], text: str
-) -> None:
+def test_rows_under_conditions_that_were_not_planned_are_refused(column: str, value: float | str, text: str) -> None:
     plan, read = campaign(1, ("AP",))
     with pytest.raises(InputError, match=re.escape(text)):
-        found(plan, change(read))
+        found(plan, changed(read, column, 3, value))
 
 
 def test_rounded_velocities_are_those_of_the_plan() -> None:

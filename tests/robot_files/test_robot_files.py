@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from tests.commanding import Truearm
+from tests.ur_controller import UR10_CONF
 
 import truearm
 from truearm import InputError
 from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.robot_files.formats import FORMATS
 
@@ -187,3 +191,67 @@ def test_show_refuses_joints_that_are_none(truearm: Truearm, joints: str, words:
     run = truearm("show", "irb120", "--joint-positions", joints)
     assert run.code == 2
     assert words in run.err
+
+
+def test_a_description_says_what_a_robot_is_and_carries() -> None:
+    bare = truearm.show("irb120")
+    assert bare.summary()["flange_at_zero_mm"] == [374.0, 0.0, 630.0]  # 302 + 72 ahead, 290 + 270 + 70 up
+    for line in (
+        "  axis_5 (revolute)  alpha_5 90  a_5 0  theta_offset_5 0  d_5 0  limits -120 to 120  up to 320 deg/s",
+        "Flange at zero joint positions, from the base: x 374.000  y 0.000  z 630.000 mm",
+        "Link masses: link 2 4.2 kg, link 4 5 kg",
+        "Rated load: 3 kg",
+    ):
+        assert line in bare.lines()
+    assert not any(line.startswith(("Payload:", "Free fall:")) for line in bare.lines())
+    loaded = bare.robot.with_payload(Payload(1.5, (0.01, 0.02, 0.03)), (0.0, -9.81, 0.0))
+    shown = truearm.show(loaded)
+    assert "Payload: 1.5 kg at x 10  y 20  z 30 mm of the flange" in shown.lines()
+    assert "Free fall: 0, -9.81, 0 m/s^2 in the base frame" in shown.lines()
+    told = shown.summary()
+    assert told["payload"] == {"mass_kg": 1.5, "cog_mm": [10.0, 20.0, 30.0]}
+    assert (told["masses_kg"], told["rated_load_kg"]) == ({"link 2": 4.2, "link 4": 5.0}, 3.0)
+    assert told["joints"][2]["limits"] == pytest.approx([-110.0, 70.0])
+
+
+def test_robots_are_found_by_maker_joints_and_words() -> None:
+    def found(**given: Any) -> list[dict[str, Any]]:
+        listed: list[dict[str, Any]] = truearm.robots(**given).summary()["robots"]
+        return listed
+
+    everything = found()
+    for maker, whole in (("abb", "ABB"), ("ur", "Universal Robots"), ("Robots", "Universal Robots")):
+        assert whole in {robot["maker"] for robot in found(maker=maker)}
+        assert len(found(maker=maker)) < len(everything)
+    assert {robot["maker"] for robot in found(maker="ur")} == {"Universal Robots"}
+    assert None not in {robot["maker"] for robot in found(maker="abb")}
+    assert {robot["joints"] for robot in found(axes=7)} == {7}
+    assert [robot["id"] for robot in found(text="gofa crb")] == ["crb15000_5_0.95"]
+    for given, words in (
+        ({"maker": "abbb"}, "no robot of this maker; got 'abbb'"),
+        ({"axes": 2}, "none of these robots has so many joints"),
+        ({"text": "irb12O"}, "none of these robots is called so.*Did you mean irb120"),
+    ):
+        with pytest.raises(InputError, match=words):
+            found(**given)
+
+
+def test_kinematics_of_a_controller_are_read_and_those_of_another_type_refused(tmp_path: Path) -> None:
+    file, out = tmp_path / "calibration.conf", tmp_path / "arm.yaml"
+    file.write_text(UR10_CONF)
+    made = truearm.import_ur_kinematics(file, "ur10", out=out)
+    words = (
+        f"ur10 with the kinematics of its controller, flange {1e3 * made.distance:.2f} mm from the type's on average"
+    )
+    assert made.lines()[0] == f"{out}: {words}"
+    assert made.summary()["mean_distance_from_type_mm"] == pytest.approx(1e3 * made.distance)
+    again = truearm.import_ur_kinematics(file, "ur10")
+    assert again.lines()[0] == words
+    assert truearm.load_robot(out).values == pytest.approx(again.robot.values)
+    (doubt,) = replace(again, fitting={"ur10e": 1e-9}).warnings
+    assert f"{np.degrees(8.20642406610186392e-05):.2g} deg for ur10. Read the type" in doubt.message
+    with pytest.raises(
+        InputError, match="kinematics of another type of robot.*Of the library, .*ur10.* fit"
+    ) as refusal:
+        truearm.import_ur_kinematics(file, "ur5")
+    assert refusal.value.parameter == "robot"

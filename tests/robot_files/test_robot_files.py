@@ -251,7 +251,7 @@ def test_kinematics_of_a_controller_are_read_and_those_of_another_type_refused(t
     (doubt,) = replace(again, fitting={"ur10e": 1e-9}).warnings
     assert f"{np.degrees(8.20642406610186392e-05):.2g} deg for ur10. Read the type" in doubt.message
     with pytest.raises(
-        InputError, match="kinematics of another type of robot.*Of the library, .*ur10.* fit"
+        InputError, match=r"kinematics of another type of robot.*Of the library, .*ur10.* fit"
     ) as refusal:
         truearm.import_ur_kinematics(file, "ur5")
     assert refusal.value.parameter == "robot"

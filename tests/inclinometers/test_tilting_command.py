@@ -62,6 +62,16 @@ def test_errors_end_with_exit_code_3(truearm: Truearm, campaign: Path, tmp_path:
     assert json.loads(run.out)["warnings"][0]["level"] == "error"
 
 
+def test_files_of_something_else_are_refused(truearm: Truearm, campaign: Path, tmp_path: Path) -> None:
+    for words, says in (
+        (("katana450", campaign / "poses.csv"), "This looks like readings of targets"),
+        ((campaign / "inclinations.csv", "katana450"), "exchanged"),
+    ):
+        run = truearm("tilting", *words, "--out", tmp_path / "out")
+        assert (run.code, says in run.err) == (2, True)
+    assert not (tmp_path / "out").exists()
+
+
 def test_inclinometers_are_planned_and_simulated(truearm: Truearm, tmp_path: Path) -> None:
     out = tmp_path / "plan.csv"
     words = ("--device", "inclinometers", "--candidates", 100, "--noise", 0.01, "--out", out)
@@ -96,6 +106,7 @@ PLAN, READ = ("plan", "katana450"), ("simulate", "katana450", "--truth", "nomina
         ((*PLAN, "--from", "data.csv"), "--from: this says nothing"),
         ((*PLAN, "--model", "full"), "--model: this says nothing"),
         ((*PLAN, "--program", "rapid"), "--program: this says nothing for inclinometers"),
+        ((*PLAN, "--floor", "5"), "--floor: the floor is above the base"),
         ((*PLAN, "--approach"), "--approach: this says nothing for inclinometers"),
         ((*READ, "--noise", 0.1), "--noise: this says nothing"),
         ((*READ, "--wrench", "1N,0N,0N,0Nm,0Nm,0Nm"), "--wrench: this says"),

@@ -84,6 +84,8 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
     _, data = campaign("irb120", 12, 0.05e-3, 1)
     cases: list[tuple[dict[str, Any], str, str]] = [
         ({"poses": 12.0}, "poses", "whole number|number of poses"),
+        ({"poses": "many"}, "poses", "a number of poses belongs here; got 'many'"),
+        ({"dwell": 2.0}, "dwell", "none is asked for"),
         ({"candidates_from": data, "device": "ballbar"}, "device, candidates_from", "a device finds its own"),
         ({"out": tmp_path / "plan.html"}, "out", "the plan is a CSV file"),
         ({"out": tmp_path / "made.csv"}, "out", "this is a folder"),

@@ -124,6 +124,7 @@ def test_what_is_not_reached_is_explained_and_ends_with_3(truearm: Truearm, tmp_
     [
         ("not as many numbers as joints; got '3 numbers'", ["--seed-joints", "1,2,3"]),
         ("numbers separated by commas", ["--seed-joints", "a,b"]),
+        ("there is no target; got 'gripper'", ["--target", "gripper"]),
         ("--seed-joints: NaN and infinity cannot be used here", ["--seed-joints", "nan,0,0,0,0,0"]),
         ("--position-only, --axis-only: only one of them", ["--position-only", "--axis-only"]),
     ],

@@ -113,6 +113,13 @@ def _side_legs(row: dict[str, str]) -> list[str]:
     return [f"B{cups[int(name[1]) - 1]}{name[2:]}" for name in _legs(row["design"])]
 
 
+def test_a_fixture_that_is_none_is_refused_and_nothing_written(truearm: Truearm, tmp_path: Path) -> None:
+    for fixture, words in (("1,2", "--fixture: the fixture has 4 or 7 numbers"), ("1,a", "numbers separated")):
+        run = truearm("hexapod", "plan", "irb120", "--fixture", fixture, "--out", tmp_path / "sheet.csv")
+        assert (run.code, words in run.err) == (2, True), fixture
+    assert not (tmp_path / "sheet.csv").exists()
+
+
 def test_world_frame(truearm: Truearm, tmp_path: Path) -> None:
     robot, _ = with_cups(load_robot("irb120"))
     cups = triangle([0.3003, 0.3, 0.2996], "B") + np.array([0.25, -0.1, 0.1])

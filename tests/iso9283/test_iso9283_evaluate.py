@@ -355,3 +355,6 @@ def test_a_file_that_is_missing_is_refused_by_its_parameter(small: Arguments) ->
     for name in (*FILES, "plan", "alignment"):
         found = refusal_of({**small, name: small["plan"].with_name("none.csv")})
         assert (found.parameter, "no such file" in str(found)) == (name, True)
+    for name in ("noise", "noise_rot"):
+        found = refusal_of(small, "poses", **{name: 0.0})
+        assert (found.parameter, "no instrument is without noise" in str(found)) == (name, True)

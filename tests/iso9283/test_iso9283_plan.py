@@ -125,6 +125,10 @@ def test_a_cube_that_the_arm_cannot_reach_is_refused(tmp_path: Path) -> None:
     far.write_text(CUBE.replace("[350, 0, 350]", "[900, 0, 350]"))
     with pytest.raises(InputError, match=r"cannot come to all poses.*missed: P"):
         truearm.iso9283_plan("irb120", criteria=["ap"], cube=far)
+    for given in ({"cube": far.with_name("none.yaml")}, {"cube": far, "constraints": far.with_name("none.yaml")}):
+        with pytest.raises(InputError, match="no such file") as refusal:
+            truearm.iso9283_plan("irb120", criteria=["ap"], **given)  # type: ignore[arg-type]
+        assert refusal.value.parameter == [*given][-1]
 
 
 @pytest.mark.parametrize(

@@ -161,7 +161,7 @@ def test_rows_are_the_same_whatever_the_size_of_the_blocks(
         (paths, PATHS, "AT,,1,0,1,2,3", "line 2, column path: the cell is empty"),
         (paths, PATHS, "AT,line,0,0,1,2,3", "line 2, column cycle: this is no number of a cycle"),
         (paths, PATHS, "AT,line,1.5,0,1,2,3", "column cycle: this is no number of a cycle"),
-        (paths, PATHS, "AT,line,3,0,1,nan,3", "line 2, column y: a number belongs here"),
+        (paths, PATHS, f"{ROWS[0]}\nAT,line,3,0,1,nan,3", "line 3, column y: a number belongs here"),
         (paths, PATHS, "AT,line,3,0,1,,3", "line 2, column y: the cell is empty"),
         (paths, PATHS, "AT,line,3,0,1,inf,3", "line 2, column y: a number belongs here"),
         (paths, PATHS, "AT,line,3,0,1,1e9,3000000000", "line 2: the number is too large to be plausible"),

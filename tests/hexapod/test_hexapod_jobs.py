@@ -11,21 +11,12 @@ import pytest
 
 import truearm
 from truearm import InputError
-from truearm.engine.data.hexapod import DEVICE, poses, triangle
-from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.data.hexapod import poses
 from truearm.engine.robot.transform import Transform
-from truearm.hexapod.reachable import ARM_RADIUS, with_cups
 from truearm.hexapod.sheet_reading import read_sheet
 
 LEGS = (0.3,) * 6
 FIXTURE = (0.22, 0.0, 0.1, np.radians(-30.0))
-
-
-def test_poses_are_counted_and_held() -> None:
-    found = truearm.hexapod_enumerate()
-    assert (found.designs, found.assemblies, len(found.poses), len(found.distinct)) == (36, 144, 72, 54)
-    assert (10, 37) in found.near_equal
-    assert "72 poses" in repr(found)
 
 
 def test_uncertainty_is_repeated_with_its_seed() -> None:
@@ -46,12 +37,14 @@ def test_one_pose_is_solved_from_any_sequence_of_lengths() -> None:
 def test_a_fixture_is_a_transform_or_numbers(tmp_path: Path) -> None:
     half = FIXTURE[3] / 2
     quaternion = (float(np.cos(half)), 0.0, 0.0, float(np.sin(half)))
+    out, steps = tmp_path / "sheet.csv", tmp_path / "steps.txt"
     plans = [
-        truearm.hexapod_plan("irb120", fixture, distinct=True, branches=["front-up"])
+        truearm.hexapod_plan("irb120", fixture, distinct=True, branches=["front-up"], out=out, steps=steps)
         for fixture in (FIXTURE, (*FIXTURE[:3], *quaternion), Transform((0.22, 0.0, 0.1), quaternion))
     ]
     assert plans[0].summary() == plans[1].summary() == plans[2].summary()
     assert all(row.branch.startswith("front-up") for row in plans[0].reachable.rows)
+    assert plans[0].lines()[-1] == f"Written to {out}, {steps}"
 
 
 def test_a_plan_and_its_sheet_are_written_and_solved(tmp_path: Path) -> None:
@@ -74,29 +67,8 @@ def test_a_plan_and_its_sheet_are_written_and_solved(tmp_path: Path) -> None:
     assert len(repr(solved)) <= 2000
 
 
-def test_nominal_lengths_are_those_of_the_device() -> None:
-    default = truearm.hexapod_solve.request.default  # type: ignore[attr-defined]
-    assert (default("base_sides"), default("tool_sides"), default("reach")) == (
-        (DEVICE.base,) * 3,
-        (DEVICE.tool,) * 3,
-        DEVICE.reach,
-    )
-    assert truearm.hexapod_plan.request.default("arm_radius") == ARM_RADIUS  # type: ignore[attr-defined]
-
-
-def test_what_was_written_is_said(tmp_path: Path) -> None:
-    out, steps = tmp_path / "sheet.csv", tmp_path / "steps.txt"
-    plan = truearm.hexapod_plan("irb120", FIXTURE, branches=["front-up"], out=out, steps=steps)
-    assert plan.lines()[-1] == f"Written to {out}, {steps}"
-
-
-def test_the_base_fixture_is_found_from_arrays() -> None:
-    robot, _ = with_cups(truearm.load_robot("irb120"))
-    cups = triangle([0.3003, 0.3, 0.2996], "B") + np.array([0.25, -0.1, 0.1])
-    joints = inverse(robot, cups, np.broadcast_to(np.diag([1.0, -1.0, -1.0]), (3, 3, 3)), target="1").joints
-    frame = truearm.hexapod_world_frame(robot, joints, (0.3003, 0.3, 0.2996), cup="1").found.frame
-    assert frame.translation == pytest.approx([0.25, -0.1, 0.1], abs=1e-9)
-    assert frame.quaternion == pytest.approx([1, 0, 0, 0], abs=1e-9)
+def one_pose(**given: Any) -> object:
+    return truearm.hexapod_solve(**{"pose": 7, "legs": LEGS, **given})
 
 
 SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
@@ -109,30 +81,14 @@ SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))
         (lambda: truearm.hexapod_solve("a.csv", pose=7, legs=LEGS), "sheet, pose, legs", "a sheet, or a pose"),
         (lambda: truearm.hexapod_solve("missing.csv"), "sheet", "there is no such file"),
         (lambda: truearm.hexapod_solve(3), "sheet", "a path belongs here"),  # type: ignore[arg-type]
-        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS[:5]), "legs", "6 numbers belong here"),
-        (lambda: truearm.hexapod_solve(pose=7, legs=(*LEGS[:5], np.nan)), "legs", "the number cannot be used"),
-        (lambda: truearm.hexapod_solve(pose=7, legs=(*LEGS[:5], 0.302)), "legs", "is beyond the range"),
-        (
-            lambda: truearm.hexapod_solve(pose=7, legs=LEGS, base_sides=(0.31, 0.3, 0.3)),
-            "base_sides",
-            "the length B1-B2",
-        ),
-        (
-            lambda: truearm.hexapod_solve(pose=7, legs=LEGS, tool_sides=(0.15, 0.2, 0.15)),
-            "tool_sides",
-            "the length T2-T3",
-        ),
-        (
-            lambda: truearm.hexapod_solve(pose=7, legs=LEGS, base_sides=(0.3, 0.3, 0.6), reach=0.4),
-            "base_sides",
-            "B1, B2, B3 lie on one line",
-        ),
-        (
-            lambda: truearm.hexapod_solve(pose=7, legs=(0.1, 0.1, 0.1, 0.3, 0.3, 0.3), reach=0.4),
-            "legs",
-            "do not meet",
-        ),
-        (lambda: truearm.hexapod_solve(pose=7, legs=LEGS, out="a.csv"), "out", "is no data file"),
+        (lambda: one_pose(legs=LEGS[:5]), "legs", "6 numbers belong here"),
+        (lambda: one_pose(legs=(*LEGS[:5], np.nan)), "legs", "the number cannot be used"),
+        (lambda: one_pose(legs=(*LEGS[:5], 0.302)), "legs", "is beyond the range"),
+        (lambda: one_pose(base_sides=(0.31, 0.3, 0.3)), "base_sides", "the length B1-B2"),
+        (lambda: one_pose(tool_sides=(0.15, 0.2, 0.15)), "tool_sides", "the length T2-T3"),
+        (lambda: one_pose(base_sides=(0.3, 0.3, 0.6), reach=0.4), "base_sides", "B1, B2, B3 lie on one line"),
+        (lambda: one_pose(legs=(0.1, 0.1, 0.1, 0.3, 0.3, 0.3), reach=0.4), "legs", "do not meet"),
+        (lambda: one_pose(out="a.csv"), "out", "is no data file"),
         (lambda: truearm.hexapod_plan("irb120", (1.0, 2.0)), "fixture", "4 or 7 numbers"),
         (lambda: truearm.hexapod_plan("irb120", "here"), "fixture", "numbers belong here"),  # type: ignore[arg-type]
         (lambda: truearm.hexapod_plan("irb120", (0, 0, np.nan, 0)), "fixture", "NaN and infinity"),

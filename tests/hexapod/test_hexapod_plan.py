@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import reduce
 
@@ -27,19 +28,20 @@ from truearm.engine.twin.twin_joint import JointTruth
 from truearm.hexapod.reachable import Reachable, arm_links, clearance, reachable, steps_text, with_cups
 from truearm.hexapod.rehearsal import ballbar, joined
 
-HALF = np.radians(-15.0)
+HALF, DOWN = np.radians(-15.0), np.diag([1.0, -1.0, -1.0])
 #: B1 of a fixture that stands before the robot, turned by -30 deg.
 FIXTURE = Transform((0.2268, 0.0, 0.1), (float(np.cos(HALF)), 0.0, 0.0, float(np.sin(HALF))))
+Arm = tuple[Robot, tuple[HexapodPose, ...]]
 
 
 @pytest.fixture(scope="module")
-def arm() -> tuple[Robot, tuple[HexapodPose, ...]]:
+def arm() -> Arm:
     robot, cups = with_cups(load_robot("lrmate200ic"))
     return robot, poses(cups)
 
 
 @pytest.fixture(scope="module")
-def plan(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> Reachable:
+def plan(arm: Arm) -> Reachable:
     return reachable(arm[0], FIXTURE, arm[1], branches=("front-up", "back-down"))
 
 
@@ -65,7 +67,7 @@ def test_the_distance_of_segments_is_the_smallest_there_is() -> None:
     assert segment_distance(*crossing) == pytest.approx([0.25], abs=1e-15)
 
 
-def test_a_bar_through_the_forearm_has_no_room(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+def test_a_bar_through_the_forearm_has_no_room(arm: Arm) -> None:
     joints = np.radians([[10.0, 20.0, 10.0, 0.0, 40.0, 0.0]])
     first, last = arm_links(arm[0], joints)
     middle = (first[3] + last[3]) / 2  # between wrist and elbow
@@ -79,9 +81,7 @@ def test_a_bar_through_the_forearm_has_no_room(arm: tuple[Robot, tuple[HexapodPo
 # -- reach ----------------------------------------------------------------------------------------------------
 
 
-def test_every_planned_configuration_makes_all_legs_nominal(
-    arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable
-) -> None:
+def test_every_planned_configuration_makes_all_legs_nominal(arm: Arm, plan: Reachable) -> None:
     robot, _ = arm
     twin = Twin(robot)
     base = triangle([0.3] * 3, "B") @ FIXTURE.rotation.T + np.array(FIXTURE.translation)
@@ -98,9 +98,7 @@ def test_every_planned_configuration_makes_all_legs_nominal(
         assert room > 0
 
 
-def test_the_plan_does_not_depend_on_where_the_robot_stands(
-    arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable
-) -> None:
+def test_the_plan_does_not_depend_on_where_the_robot_stands(arm: Arm, plan: Reachable) -> None:
     robot, wanted = arm
     cups = {target.name: [robot.values[target.parameter(a)] for a in "xyz"] for target in robot.targets}
     moved = robot.with_frames(Transform((1.0, 2.0, 3.0), (0.8, 0.0, 0.6, 0.0)), cups)
@@ -109,27 +107,27 @@ def test_the_plan_does_not_depend_on_where_the_robot_stands(
     assert again.clearance == pytest.approx(plan.clearance, abs=1e-9)
 
 
-def test_the_steps_name_every_leg(arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable) -> None:
+def test_the_steps_name_every_leg(arm: Arm, plan: Reachable) -> None:
     text = steps_text(plan, arm[0])
     assert text.count("[ ] Attach the bar between") == 6 * len(plan.rows)
     assert "Attach the bar between B1 and T1." in text
     assert max(len(line) for line in text.splitlines()) <= 120
 
 
-def test_refusals(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+def test_refusals(arm: Arm) -> None:
     robot, wanted = arm
-    with pytest.raises(InputError, match=r"can reach none of the 72 poses.*out of reach"):
-        reachable(robot, Transform((5.0, 0.0, 0.0)), wanted)
-    with pytest.raises(InputError, match="there is no such branch"):
-        reachable(robot, FIXTURE, wanted, branches=("left",))
-    with pytest.raises(InputError, match="arm at the bars"):
-        reachable(robot, FIXTURE, wanted, arm_radius=1.0)
-    with pytest.raises(InputError, match="no such tool"):
-        with_cups(load_robot("lrmate200ic"), "gripper")
-    with pytest.raises(InputError, match="three cups"):
-        with_cups(load_robot("ur5"))
-    with pytest.raises(InputError, match="cannot bring its cup 1 to B1"):
-        touching(robot, "1", Transform((2.0, 0.0, 0.0)), 0.3, np.diag([1.0, -1.0, -1.0]))
+    calls: list[tuple[Callable[[], object], str]] = [
+        (lambda: reachable(robot, Transform((5.0, 0.0, 0.0)), wanted), "can reach none of the 72 poses.*out of reach"),
+        (lambda: reachable(robot, FIXTURE, wanted, branches=("left",)), "there is no such branch"),
+        (lambda: reachable(robot, FIXTURE, wanted, arm_radius=1.0), "arm at the bars"),
+        (lambda: with_cups(load_robot("lrmate200ic"), "gripper"), "no such tool"),
+        (lambda: with_cups(load_robot("ur5")), "three cups"),
+        (lambda: touching(robot, "1", Transform((2.0, 0.0, 0.0)), 0.3, DOWN), "cannot bring its cup 1 to B1"),
+        (lambda: identify_placements(robot, [], ELASTIC), "at least one place"),
+    ]
+    for call, words in calls:
+        with pytest.raises(InputError, match=words):
+            call()
 
 
 # -- two steps ------------------------------------------------------------------------------------------------
@@ -155,16 +153,16 @@ def wrong(robot: Robot, share: float, seed: int) -> Twin:
 
 
 @pytest.fixture(scope="module")
-def campaign(arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable) -> tuple[Twin, Campaign]:
+def campaign(arm: Arm, plan: Reachable) -> tuple[Twin, Campaign]:
     robot, wanted = arm
     twin = wrong(robot, 0.3, 3)
-    touches = touching(robot, "1", FIXTURE, DEVICE.base, np.diag([1.0, -1.0, -1.0]))
+    touches = touching(robot, "1", FIXTURE, DEVICE.base, DOWN)
     bar = ballbar(np.random.default_rng(3))
     return twin, two_steps(robot, twin, touches, wanted, plan.rows[::2], ELASTIC, bar)
 
 
 def test_what_is_beyond_the_range_is_skipped_until_the_first_calibration(
-    arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable, campaign: tuple[Twin, Campaign]
+    arm: Arm, plan: Reachable, campaign: tuple[Twin, Campaign]
 ) -> None:
     twin, done = campaign
     rows = plan.rows[::2]
@@ -183,7 +181,7 @@ def test_what_is_beyond_the_range_is_skipped_until_the_first_calibration(
 
 
 def test_the_final_calibration_sees_all_and_a_tracker_is_better_away_from_the_fixture(
-    arm: tuple[Robot, tuple[HexapodPose, ...]], campaign: tuple[Twin, Campaign]
+    arm: Arm, campaign: tuple[Twin, Campaign]
 ) -> None:
     robot, _ = arm
     twin, done = campaign
@@ -209,10 +207,9 @@ def _frame_of(cups: Array) -> tuple[Array, Array]:
     return np.column_stack([x, np.cross(z, x), z]), cups[0]
 
 
-def test_a_robot_that_is_too_wrong_is_refused(arm: tuple[Robot, tuple[HexapodPose, ...]], plan: Reachable) -> None:
+def test_a_robot_that_is_too_wrong_is_refused(arm: Arm, plan: Reachable) -> None:
     robot, wanted = arm
-    down = np.diag([1.0, -1.0, -1.0])
-    touches = touching(robot, "1", FIXTURE, DEVICE.base, down)
+    touches = touching(robot, "1", FIXTURE, DEVICE.base, DOWN)
     bar = ballbar(np.random.default_rng(0))
     with pytest.raises(InputError, match=r"the distance B1-B2 is beyond"):
         two_steps(robot, Twin(robot.with_values({"a_3": 0.33})), touches, wanted, plan.rows[:3], ELASTIC, bar)
@@ -238,7 +235,7 @@ def at_places(twin: Twin, counts: tuple[int, ...], noise: float) -> tuple[list[T
     return frames, data
 
 
-def test_places_come_into_one_frame_by_the_model(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+def test_places_come_into_one_frame_by_the_model(arm: Arm) -> None:
     robot, _ = arm
     cups = {target.name: [robot.values[target.parameter(a)] for a in "xyz"] for target in robot.targets}
     frames, data = at_places(Twin(robot), (4, 6, 5), 0.0)
@@ -254,7 +251,7 @@ def _inverse_of(frame: Transform) -> Transform:
     return Transform.from_matrix(frame.rotation.T, -frame.rotation.T @ np.array(frame.translation))
 
 
-def test_more_places_tell_more(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
+def test_more_places_tell_more(arm: Arm) -> None:
     robot, _ = arm
     true = wrong(robot, 0.3, 8)
     twin = Twin(true.robot, {n: JointTruth(compliance=t.compliance) for n, t in true.joints.items()})
@@ -275,8 +272,3 @@ def test_more_places_tell_more(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> No
     best = identify(robot, reduce(joined, world), ELASTIC)
     back = replace(unseen, position=there @ frames[0].rotation.T + np.array(frames[0].translation))
     assert left[1] < 2.0 * errors_of(best.robot, back).position_norms.mean()
-
-
-def test_no_place_is_refused(arm: tuple[Robot, tuple[HexapodPose, ...]]) -> None:
-    with pytest.raises(InputError, match="at least one place"):
-        identify_placements(arm[0], [], ELASTIC)

@@ -56,43 +56,19 @@ def test_units_are_taken_as_given(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("joints", "target", "parts"),
     [
-        (
-            JOINTS,
-            "1 2 3\n",
-            ["a.txt", "as many rows as", "q.txt", "1 row'", "allowed: 3 rows", "zeros or NaN"],
-        ),
+        (JOINTS, "1 2 3\n", ["a.txt", "as many rows as", "1 row'", "allowed: 3 rows", "zeros or NaN"]),
         (JOINTS, "1 2 3\n1 2\n1 2 3", ["a.txt, line 2", "three numbers", "2 numbers", "allowed: 3 numbers"]),
-        (
-            JOINTS,
-            "1 2 3\n1 2 inf\n1 2 3",
-            ["a.txt, line 2, column 3", "'inf'", "NaN for a missing", "row of zeros"],
-        ),
-        (
-            JOINTS,
-            "x y z\n1 2 3",
-            ["a.txt, line 1, column 1", "a number belongs here", "'x'", "heading with #"],
-        ),
-        (
-            JOINTS,
-            "1,2,3\n",
-            ["a.txt, line 1, column 1", "'1,2,3'", "Separate numbers by blanks", "import table"],
-        ),
+        (JOINTS, "1 2 3\n1 2 inf\n1 2 3", ["a.txt, line 2, column 3", "'inf'", "NaN for a missing"]),
+        (JOINTS, "x y z\n1 2 3", ["a.txt, line 1, column 1", "a number belongs here", "'x'", "heading with #"]),
+        (JOINTS, "1,2,3\n", ["a.txt, line 1, column 1", "'1,2,3'", "Separate numbers by blanks", "import table"]),
         (JOINTS, "1;2;3\n", ["'1;2;3'", "import table"]),
         (JOINTS, "1_0 2 3\n", ["'1_0'"]),
         (JOINTS, "1 2e9 3\n", ["a.txt, line 1, column 2", "too large to be plausible", "'2e9'", "1e+09 mm"]),
         ("1 2\n1 1e8\n1 2", GOOD, ["q.txt, line 2, column 2", "too large", "5.72958e+07 deg"]),
         (JOINTS, "", ["a.txt: the file is empty"]),
         (JOINTS, "# nothing\n", ["a.txt: the file holds no rows", "exported whole"]),
-        (
-            "1 2\n1 NaN\n1 2",
-            GOOD,
-            ["q.txt, line 2, column 2", "'NaN'", "allowed: a finite number", "needs all joints"],
-        ),
-        (
-            "# q\n1 2\n1 2 3\n1 2",
-            GOOD,
-            ["q.txt, line 3", "not as long as line 2", "3 numbers", "allowed: 2 numbers"],
-        ),
+        ("1 2\n1 NaN\n1 2", GOOD, ["q.txt, line 2, column 2", "'NaN'", "a finite number", "needs all joints"]),
+        ("# q\n1 2\n1 2 3\n1 2", GOOD, ["q.txt, line 3", "not as long as line 2", "allowed: 2 numbers"]),
     ],
 )
 def test_refusals(tmp_path: Path, joints: str, target: str, parts: list[str]) -> None:
@@ -122,11 +98,7 @@ def test_laser_tracker_campaign(measured_data: Path, tmp_path: Path, joints: str
         return {name: folder / f"{name}.txt" for name in names}
 
     data, missing = read_matrices(
-        folder / joints,
-        files("target_1", "target_2", "target_3"),
-        files("base_1", "base_2", "base_3"),
-        "deg",
-        "mm",
+        folder / joints, files("target_1", "target_2", "target_3"), files("base_1", "base_2", "base_3"), "deg", "mm"
     )
     assert (data.configurations, data.joints.shape, data.targets) == (
         500,

@@ -29,13 +29,13 @@ def about(axis: str, degrees: float) -> np.ndarray:
     return np.asarray(rotation_from_vector(np.radians(degrees) * np.eye(3)["xyz".index(axis)][None])[0])
 
 
-@pytest.mark.parametrize("order", [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c])
-def test_angles_of_every_order(tmp_path: Path, order: str) -> None:
-    one, two, three = (about(axis, value) for axis, value in zip(order, (20.0, -50.0, 110.0), strict=True))
-    for axes, wanted in (("moving", one @ two @ three), ("fixed", three @ two @ one)):
-        entry = f"angles: {{columns: [a, b, c], about: {order}, axes: {axes}, unit: deg}}"
-        got = turned(tmp_path, "20,-50,110", entry)
-        assert got == pytest.approx(quaternion_from_rotation(wanted), abs=1e-12)
+def test_angles_of_every_order(tmp_path: Path) -> None:
+    for order in (a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c):
+        one, two, three = (about(axis, value) for axis, value in zip(order, (20.0, -50.0, 110.0), strict=True))
+        for axes, wanted in (("moving", one @ two @ three), ("fixed", three @ two @ one)):
+            entry = f"angles: {{columns: [a, b, c], about: {order}, axes: {axes}, unit: deg}}"
+            got = turned(tmp_path, "20,-50,110", entry)
+            assert got == pytest.approx(quaternion_from_rotation(wanted), abs=1e-12), (order, axes)
 
 
 def test_angles_of_known_makers(tmp_path: Path) -> None:
@@ -153,17 +153,12 @@ TIMED = "pose,q1,q2,ball,X,Y,Z,when\n{}"
 
 def numbers(folder: Path, rows: str, order: str) -> list[float]:
     data = read(folder, TIMED.format(rows), MAP + f"order: {order}\n")
+    (folder / "again.csv").write_text(csv_text(data))
+    again = read_csv(folder / "again.csv")
     assert data.number is not None
-    again = read_csv_again(folder, csv_text(data))
-    assert again == data.number.tolist()
-    return again
-
-
-def read_csv_again(folder: Path, text: str) -> list[float]:
-    (folder / "again.csv").write_text(text)
-    data = read_csv(folder / "again.csv")
-    assert data.number is not None
-    return [float(number) for number in data.number]
+    assert again.number is not None
+    assert again.number.tolist() == data.number.tolist()
+    return [float(number) for number in again.number]
 
 
 def test_the_order_is_told_by_labels_rows_numbers_and_times(tmp_path: Path) -> None:
@@ -180,51 +175,42 @@ def test_the_order_is_told_by_labels_rows_numbers_and_times(tmp_path: Path) -> N
     assert numbers(tmp_path, days, "{column: when, time: iso}") == [1, 0, 2]
     ours = rows.format("23.11.2026 10:00:01", "22.11.2026 23:59:00", "23.11.2026 10:00:09")
     assert numbers(tmp_path, ours, "{column: when, time: '%d.%m.%Y %H:%M:%S'}") == [1, 0, 2]
-
-
-def test_several_rows_of_a_configuration_and_missing_times(tmp_path: Path) -> None:
-    rows = "a,1,2,t,1,2,3,4\na,1,2,u,1,2,3,5\nb,3,4,t,1,2,3,\nb,3,4,u,1,2,3,1\n"
-    assert numbers(tmp_path, rows, "{column: when}") == [1, 0]
+    several = "a,1,2,t,1,2,3,4\na,1,2,u,1,2,3,5\nb,3,4,t,1,2,3,\nb,3,4,u,1,2,3,1\n"
+    assert numbers(tmp_path, several, "{column: when}") == [1, 0]
 
 
 @pytest.mark.parametrize(
     ("rows", "order", "part"),
     [
-        ("a,1,2,t,1,2,3,1\nb,3,4,t,1,2,3,2\na,1,2,u,1,2,3,3\n", "{column: when}", "line 3, column when: the conf"),
+        ("a 1, b 2, a 3", "{column: when}", "line 3, column when: the conf"),
+        ("a 1, b 1", "{column: when}", "line 3, column when: the configurations 'a' and 'b' w"),
+        ("a 1, b 2, a 3", "{by: rows}", "line 4: the configuration 'a' comes"),
+        ("P1 1, Q2 2", "{by: labels}", "line 3: the label does not tell the order"),
+        ("P1 1, P01 2", "{by: labels}", "line 3: two labels have the same number: P1 and P01"),
+        ("a x", "{column: when, time: iso}", "line 2, column when: this is no time of the format"),
+        ("a x", "{column: when}", "line 2, column when: a number belongs here"),
+        ("a ", "{column: when}", "line 2, column when: the column that shall tell the order is empty"),
+        ("a 23:59, b 00:01", "{column: when, time: '%H:%M'}", "line 2, column when: the times have no day"),
         (
-            "a,1,2,t,1,2,3,1\nb,3,4,t,1,2,3,1\n",
-            "{column: when}",
-            "line 3, column when: the configurations 'a' and 'b' w",
-        ),
-        ("a,1,2,t,1,2,3,1\nb,3,4,t,1,2,3,2\na,1,2,u,1,2,3,3\n", "{by: rows}", "line 4: the configuration 'a' comes"),
-        ("P1,1,2,t,1,2,3,1\nQ2,3,4,t,1,2,3,2\n", "{by: labels}", "line 3: the label does not tell the order"),
-        (
-            "P1,1,2,t,1,2,3,1\nP01,3,4,t,1,2,3,2\n",
-            "{by: labels}",
-            "line 3: two labels have the same number: P1 and P01",
-        ),
-        ("a,1,2,t,1,2,3,x\n", "{column: when, time: iso}", "line 2, column when: this is no time of the format"),
-        ("a,1,2,t,1,2,3,x\n", "{column: when}", "line 2, column when: a number belongs here"),
-        ("a,1,2,t,1,2,3,\n", "{column: when}", "line 2, column when: the column that shall tell the order is empty"),
-        (
-            "a,1,2,t,1,2,3,23:59\nb,3,4,t,1,2,3,00:01\n",
-            "{column: when, time: '%H:%M'}",
-            "line 2, column when: the times have no day",
-        ),
-        (
-            "a,1,2,t,1,2,3,2026-01-01T10:00Z\nb,3,4,t,1,2,3,2026-01-01T10:01\n",
+            "a 2026-01-01T10:00Z, b 2026-01-01T10:01",
             "{column: when, time: iso}",
             "line 3, column when: this time has no time zone",
         ),
-        ("a,1,2,t,1,2,3,1\n", "{column: time}", "map.yaml, order.column: "),
-        ("a,1,2,t,1,2,3,1\n", "{column: when, time: '%'}", "map.yaml, order.time: this is no format of times"),
-        ("a,1,2,t,1,2,3,1\n", "{by: rows, column: when}", "map.yaml, order: give either by"),
-        ("a,1,2,t,1,2,3,1\n", "{by: rows, time: iso}", "map.yaml, order: time is the format of a column"),
+        ("a 1", "{column: time}", "map.yaml, order.column: "),
+        ("a 1", "{column: when, time: '%'}", "map.yaml, order.time: this is no format of times"),
+        ("a 1", "{by: rows, column: when}", "map.yaml, order: give either by"),
+        ("a 1", "{by: rows, time: iso}", "map.yaml, order: time is the format of a column"),
     ],
 )
 def test_an_order_that_is_not_told_is_refused_with_its_cell(tmp_path: Path, rows: str, order: str, part: str) -> None:
+    table, seen = "", set[str]()
+    for number, row in enumerate(rows.split(", ")):
+        label, when = row.split(" ")
+        joint = 0 if label in seen else number  # the same configuration has the same joint positions
+        table += f"{label},{joint},2,{'u' if label in seen else 't'},1,2,3,{when}\n"
+        seen.add(label)
     with pytest.raises(InputError, match=re.escape(part)):
-        numbers(tmp_path, rows, order)
+        numbers(tmp_path, table, order)
 
 
 def test_configurations_that_were_not_measured_keep_their_place(tmp_path: Path) -> None:

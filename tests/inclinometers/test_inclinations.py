@@ -25,6 +25,9 @@ c,9,10,20,0,1,,1,17.5,0.001
 """
 
 
+SOUND = f"{HEADER}\n{ROWS}"
+
+
 def read(folder: Path, text: str) -> object:
     path = folder / "inclinations.csv"
     path.write_text(text)
@@ -32,7 +35,7 @@ def read(folder: Path, text: str) -> object:
 
 
 def test_columns_become_angles_instruments_and_pairs(tmp_path: Path) -> None:
-    (tmp_path / "data.csv").write_text(f"{HEADER}\n{ROWS}")
+    (tmp_path / "data.csv").write_text(SOUND)
     found = read_inclinations(tmp_path / "data.csv")
     assert found.labels == ("a", "b", "c")
     assert found.instruments.names == ("link 1", "link 2, sensor left", "link 2, sensor right")
@@ -48,7 +51,7 @@ def test_columns_become_angles_instruments_and_pairs(tmp_path: Path) -> None:
 
 
 def test_what_was_written_is_read_again(tmp_path: Path) -> None:
-    (tmp_path / "data.csv").write_text(f"{HEADER}\n{ROWS}")
+    (tmp_path / "data.csv").write_text(SOUND)
     found = read_inclinations(tmp_path / "data.csv")
     text = inclinations_text(found)
     (tmp_path / "again.csv").write_text(text)
@@ -83,28 +86,28 @@ def test_a_payload_is_a_weight_at_the_flange(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        pytest.param(f"{HEADER}\n{ROWS}".replace(",link,", ",leg,"), "not known.*allowed: .* link,", id="leg"),
+        pytest.param(SOUND.replace(",link,", ",leg,"), "not known.*allowed: .* link,", id="leg"),
         pytest.param("configuration,joint_1 [deg],link,sigma [deg]\n1,2,1,1\n", "column x is missing", id="no angle"),
         pytest.param("configuration,joint_1 [deg],link,x [deg]\n1,2,1,1\n", "column sigma is missing", id="no sigma"),
         pytest.param("configuration,joint_1 [deg],x [deg],sigma [deg]\n1,2,1,1\n", "column link is missing", id="link"),
         pytest.param("joint_1 [deg],link,x [deg],sigma [deg]\n1,2,1,1\n", "configuration is missing", id="label"),
         pytest.param("configuration,link,x [deg],sigma [deg]\n1,2,1,1\n", "joint_1 is missing", id="no joints"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("x [deg]", "x"), "no unit", id="angle without unit"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("x [deg]", "x [mm]"), "allowed: mrad, rad, deg", id="length"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("sigma [deg]", "sigma"), "no unit", id="sigma without unit"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("link,", "link [1],"), "takes no unit", id="unit of a link"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("sensor", "link"), "appears twice", id="column twice"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace(",2,left", ",3,left"), r"no such link; got '3'.*1 to 2", id="link 3"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace(",2,left", ",two,left"), "no such link", id="link two"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace(",2,left", ",0,left"), "this is the base", id="base"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("left,-2", "left,-90.1"), "so high.*line 3|line 3.*so high", id="90"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("left,-2", "left,nan"), "NaN", id="NaN"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("right,", "left,"), "read twice.*sensor", id="twice"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("a,3", "a,0"), "order of measurement", id="order 0"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("b,4", "b,3"), "same place in the order", id="same order"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("1500", "-1500"), "mass cannot be negative", id="mass"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("0.002", "0"), "above zero", id="sigma of zero"),
-        pytest.param(f"{HEADER}\n{ROWS}".replace("a,3,10,20,0,2,left", "a,3,10,21,0,2,left"), "differ", id="joints"),
+        pytest.param(SOUND.replace("x [deg]", "x"), "no unit", id="angle without unit"),
+        pytest.param(SOUND.replace("x [deg]", "x [mm]"), "allowed: mrad, rad, deg", id="length"),
+        pytest.param(SOUND.replace("sigma [deg]", "sigma"), "no unit", id="sigma without unit"),
+        pytest.param(SOUND.replace("link,", "link [1],"), "takes no unit", id="unit of a link"),
+        pytest.param(SOUND.replace("sensor", "link"), "appears twice", id="column twice"),
+        pytest.param(SOUND.replace(",2,left", ",3,left"), r"no such link; got '3'.*1 to 2", id="link 3"),
+        pytest.param(SOUND.replace(",2,left", ",two,left"), "no such link", id="link two"),
+        pytest.param(SOUND.replace(",2,left", ",0,left"), "this is the base", id="base"),
+        pytest.param(SOUND.replace("left,-2", "left,-90.1"), "so high.*line 3|line 3.*so high", id="90"),
+        pytest.param(SOUND.replace("left,-2", "left,nan"), "NaN", id="NaN"),
+        pytest.param(SOUND.replace("right,", "left,"), "read twice.*sensor", id="twice"),
+        pytest.param(SOUND.replace("a,3", "a,0"), "order of measurement", id="order 0"),
+        pytest.param(SOUND.replace("b,4", "b,3"), "same place in the order", id="same order"),
+        pytest.param(SOUND.replace("1500", "-1500"), "mass cannot be negative", id="mass"),
+        pytest.param(SOUND.replace("0.002", "0"), "above zero", id="sigma of zero"),
+        pytest.param(SOUND.replace("a,3,10,20,0,2,left", "a,3,10,21,0,2,left"), "differ", id="joints"),
         pytest.param(HEADER.replace("payload [g]", "payload_x [mm]") + "\n" + ROWS, "payload is missing", id="cog"),
         pytest.param(HEADER.replace("payload [g]", "force_x [N]") + "\n" + ROWS, "force_y is missing", id="force"),
         pytest.param(HEADER.replace(",", ";") + "\n" + ROWS.replace(",", ";"), "separated by commas", id="semicolons"),
@@ -117,7 +120,7 @@ def test_refusals(tmp_path: Path, text: str, says: str) -> None:
 
 
 def test_objects_that_do_not_fit_together_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "data.csv").write_text(f"{HEADER}\n{ROWS}")
+    (tmp_path / "data.csv").write_text(SOUND)
     found = read_inclinations(tmp_path / "data.csv")
     other = replace(found.instruments, links=(0, 1, 2))
     bent: dict[str, tuple[dict[str, Any], str]] = {

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.inclinations import InclinometerReadings, Pairs, deviation_of_change
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import MODELS
+from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
@@ -144,15 +147,95 @@ def test_refusals() -> None:
         InclinometerReadings(readings.pairs, readings.change[:, :4], readings.sigma)
     with pytest.raises(InputError, match="standard deviation"):
         replace(readings, sigma=0.0)
-    with pytest.raises(InputError, match="no change of inclination"):
-        calibrate_tilting(KATANA, replace(readings, change=np.full_like(readings.change, np.nan)))
-    with pytest.raises(InputError, match="not in pairs"):
-        calibrate_tilting(KATANA, readings, poses.of_configurations(range(15)))
-    with pytest.raises(InputError, match="not in pairs"):
-        calibrate_tilting(KATANA, readings, poses.of_configurations([1, 2, 3, 4]))
-    with pytest.raises(InputError, match="declare no standard deviation"):
-        calibrate_tilting(KATANA, readings, replace(poses, sigma=None))
+    unread = replace(readings, change=np.full_like(readings.change, np.nan))
+    for given, says in (
+        ((unread,), "no change of inclination"),
+        ((readings, poses.of_configurations(range(15))), "not in pairs"),
+        ((readings, poses.of_configurations([1, 2, 3, 4])), "not in pairs"),
+        ((readings, replace(poses, sigma=None)), "declare no standard deviation"),
+    ):
+        with pytest.raises(InputError, match=says):
+            calibrate_tilting(KATANA, *given)
     q = KATANA.random_configurations(4, np.random.default_rng(0))
     unloaded = measure_pairs(twin, Pairs(Postures(q), Postures(q)), 1e-5, np.random.default_rng(0))
     with pytest.raises(InputError, match="no pair of poses"):
         calibrate_tilting(KATANA, readings, unloaded)
+
+
+DEVIATION = deviation_of_change(RESOLUTION)
+
+
+def planned(seed: int = 0, **options: Any) -> TiltingPlan:
+    return plan_tilting(load_robot("katana450"), np.random.default_rng(seed), deviation=DEVIATION, **options)
+
+
+def test_loads_tell_every_constant_of_every_joint() -> None:
+    plan = planned()
+    expected = {name: deviation / DEGREE for name, deviation in plan.expected.items()}
+    assert len(plan.expected) == 15
+    for i in range(2, 6):
+        assert expected[f"backlash_{i}"] < 3e-4
+        assert expected[f"clearance_{i}"] < 2e-4
+        assert plan.expected[f"compliance_{i}"] < 1e-6  # of about 2e-5
+    assert expected["clearance_1"] < 1e-4
+    assert expected["backlash_1"] < 2e-3  # of 0.063, by the poses
+    assert plan.expected["compliance_1"] < 2e-6
+
+
+def test_pairs_change_the_load_alone_and_poses_push_the_first_joint_both_ways() -> None:
+    plan = planned()
+    assert (len(plan.inclined), len(plan.posed)) == (24, 8)
+    for pairs in (plan.inclined, plan.posed):
+        assert np.array_equal(pairs.first.joints, pairs.second.joints)
+        assert pairs.in_turn.wrench is not None
+        assert np.all(np.linalg.norm(pairs.in_turn.wrench, axis=1) == 20.0)
+    about_z = load_robot("katana450").with_effects(["compliance"]).loaded(plan.posed.in_turn).loads
+    assert about_z is not None
+    first, second = about_z[0, 5, ::2], about_z[0, 5, 1::2]
+    assert np.any(first * second < 0)
+    assert np.abs(about_z[0, 5]).min() > 0.2
+
+
+def test_gravity_alone_turns_links_a_little_and_leaves_the_vertical_joint_unknown() -> None:
+    plan = planned(force=0.0, move=20 * DEGREE, posed=0)
+    assert len(plan.posed) == 0
+    moved = np.abs(plan.inclined.second.joints - plan.inclined.first.joints)
+    assert 0 < moved.max() <= 20 * DEGREE * (1 + 1e-9)
+    assert plan.expected["backlash_1"] == pytest.approx(0.05 * DEGREE, rel=1e-3)  # its prior
+    assert plan.expected["compliance_1"] == pytest.approx(1e-3, rel=1e-3)
+    for i in range(2, 6):
+        assert plan.expected[f"backlash_{i}"] < 0.005 * DEGREE
+        assert plan.expected[f"clearance_{i}"] < 0.001 * DEGREE
+
+
+def test_chosen_pairs_tell_more_than_twice_as_many_at_random(monkeypatch: pytest.MonkeyPatch) -> None:
+    def volume(plan: TiltingPlan) -> float:
+        return sum(math.log(deviation) for deviation in plan.expected.values())
+
+    chosen = planned()
+
+    def first_come(rows: Array, count: int, known: Array, interest: int) -> list[int]:
+        return list(range(count))
+
+    monkeypatch.setattr("truearm.inclinometers.pairs.most_informative", first_come)
+    assert volume(chosen) < volume(planned(inclined=48, posed=16))
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"force": 0.0, "posed": 0}, "do not differ"),
+        ({"force": -1.0, "move": 0.1}, "do not differ"),
+        ({"force": 0.0, "move": 0.1}, "under two loads"),
+        ({"inclined": 5000}, "too few postures"),
+    ],
+)
+def test_plans_that_tell_nothing_are_refused(options: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        planned(**options)
+
+
+def test_an_arm_that_weighs_nothing_needs_a_force() -> None:
+    robot = replace(load_robot("katana450"), masses=())
+    with pytest.raises(InputError, match="Give a larger force"):
+        plan_tilting(robot, np.random.default_rng(0), deviation=DEVIATION, force=0.0, move=0.3, posed=0)

@@ -9,18 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.house.examples import performance_files
+from tests.iso9283.campaign_files import Arguments, evaluated, notices, planned_in
 from tests.performance_plan import small_plan
 
-import truearm
 from truearm.engine.document.document import Picture, Section, Words
-from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.iso9283.evaluating.evaluate import RESULT, Iso9283Evaluation
 from truearm.iso9283.evaluating.figures import pose_pictures
 from truearm.iso9283.evaluating.report import path_pictures
-from truearm.iso9283.planning.plan_file import PLAN, ROBOT, plan_text
 
-Arguments = dict[str, Any]
+READ = ("poses", "paths")
 
 
 @pytest.fixture(scope="module")
@@ -28,13 +25,9 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Arguments:
     """Return the arguments of poses and paths that were measured, and a first result beside them."""
     folder = tmp_path_factory.mktemp("beside")
     plan = small_plan(["AP", "AT"], cycles={"AP": 5, "AT": 3}, velocities=(1.0, 0.5))
-    (folder / PLAN).write_text(plan_text(plan))
-    (folder / ROBOT).write_text(robot_text(plan.robot))
-    truearm.iso9283_simulate("irb120", folder / PLAN, seed=1, rate=100.0, out=folder / "read")
-    files = {name: folder / "read" / f"{name}.csv" for name in ("poses", "paths")}
-    arguments: Arguments = {"plan": folder / PLAN, "alignment": folder / "read" / "alignment.yaml", **files}
-    truearm.iso9283_evaluate(**arguments, out=folder / "first")
-    return arguments | {"compare": folder / "first" / RESULT}
+    given = planned_in(folder, plan, rate=100.0)
+    evaluated(given, "poses", "paths", out=folder / "first")
+    return given | {"compare": folder / "first" / RESULT}
 
 
 def pictures(found: Iso9283Evaluation) -> dict[str, Section]:
@@ -56,7 +49,7 @@ def words(drawing: Section) -> str:
 
 
 def test_deviations_of_both_results_are_in_one_picture(given: Arguments) -> None:
-    found = truearm.iso9283_evaluate(**given)
+    found = evaluated(given, *READ, compare=given["compare"])
     drawn = pictures(found)
     other, own = named(drawn["paths"], "other result"), named(drawn["paths"], "barycentre")
     assert len(other) == len(own) == 4
@@ -75,18 +68,9 @@ def test_deviations_of_both_results_are_in_one_picture(given: Arguments) -> None
 
 
 def test_a_result_alone_has_no_other_one_in_its_pictures(given: Arguments) -> None:
-    drawn = pictures(truearm.iso9283_evaluate(**{**given, "compare": None}))
-    assert named(drawn["paths"], "other result") == []
-    assert named(drawn["accuracy"], "of the other result") == []
+    drawn = pictures(evaluated(given, *READ))
+    assert named(drawn["paths"], "other result") == named(drawn["accuracy"], "of the other result") == []
     assert "other" not in words(drawn["paths"]) + words(drawn["accuracy"])
-
-
-def _older(result: dict[str, Any]) -> None:
-    del result["curves"], result["offsets"]
-
-
-def _tied_otherwise(result: dict[str, Any]) -> None:
-    result["alignment"]["kind"] = "controller-frame"
 
 
 def _holes(result: dict[str, Any]) -> None:
@@ -94,33 +78,38 @@ def _holes(result: dict[str, Any]) -> None:
         curve["distance_mm"][3] = None
 
 
-@pytest.mark.parametrize(("change", "curves"), [(_older, 0), (_tied_otherwise, 0), (_holes, 4)])
+@pytest.mark.parametrize(
+    ("change", "curves"),
+    [
+        (lambda result: [result.pop(name) for name in ("curves", "offsets")], 0),
+        (lambda result: result["alignment"].update(kind="controller-frame"), 0),
+        (_holes, 4),
+    ],
+)
 def test_what_the_other_result_does_not_have_is_not_drawn(
-    change: Callable[[dict[str, Any]], None], curves: int, given: Arguments, tmp_path: Path
+    change: Callable[[dict[str, Any]], object], curves: int, given: Arguments, tmp_path: Path
 ) -> None:
     other = json.loads(given["compare"].read_text())
     change(other)
     (tmp_path / RESULT).write_text(json.dumps(other))
-    found = truearm.iso9283_evaluate(**{**given, "compare": tmp_path / RESULT})
+    found = evaluated(given, *READ, compare=tmp_path / RESULT)
     assert len(named(pictures(found)["paths"], "other result")) == curves
     assert ("of the other result" in found.contents()["report.html"]) == (curves > 0)
 
 
 def test_several_velocities_are_broken_behind_commas(given: Arguments) -> None:
-    page = truearm.iso9283_evaluate(**given).contents()["report.html"]
+    page = evaluated(given, *READ, compare=given["compare"]).contents()["report.html"]
     assert "<td>50\u00a0%:\u00a0" in page
     assert '<td class="n">50\u00a0%' not in page
 
 
-def test_the_warning_names_the_components_that_the_instrument_is_too_coarse_for(tmp_path: Path) -> None:
-    for name, text in performance_files().items():
-        (tmp_path / name).write_text(text)
-    files: Arguments = {"poses": tmp_path / "poses.csv", "alignment": tmp_path / "alignment.yaml"}
-    found = truearm.iso9283_evaluate(tmp_path / PLAN, **files, noise=1e-3)
-    (said,) = [notice.message for notice in found.warnings if notice.code == "instrument-too-coarse"]
+def test_the_warning_names_the_components_that_the_instrument_is_too_coarse_for(small: Arguments) -> None:
+    found = evaluated(small, "poses", noise=1e-3)
+    said = notices(found)["instrument-too-coarse"]
+    assert said.level == "warning"
     coarse = {(value.id, value.component) for value in found.values if value.status == "instrument-too-coarse"}
     assert ("RP", "position") in coarse
-    assert "more" not in said.partition("values of")[2].partition(". They")[0]
+    assert "more" not in said.message.partition("values of")[2].partition(". They")[0]
     for id_, component in coarse:
-        inside = said.partition(f" {id_}")[2]
+        inside = said.message.partition(f" {id_}")[2]
         assert component == "position" or component in inside.partition(")")[0]

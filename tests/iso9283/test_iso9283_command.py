@@ -7,15 +7,11 @@ from pathlib import Path
 
 import pytest
 from tests.commanding import Truearm
-from tests.house.examples import performance_files
-
-CUBE = "truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n"
+from tests.iso9283.campaign_files import CUBE, Arguments
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    for name, text in performance_files().items():
-        (tmp_path / name).write_text(text)
+def folder(small: Arguments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "cube.yaml").write_text(CUBE)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -55,26 +51,3 @@ def test_a_campaign_is_simulated_with_an_instrument_in_millimetres(truearm: True
     run = truearm(*words, "--out", "read")
     assert (run.code, "25 attained poses" in run.out) == (0, True)
     assert (folder / "read" / "poses.csv").exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("plan", "irb120", "--velocities", "150", "--out", "a"), "--velocities"),
-        (("plan", "irb120", "--criteria", "zz", "--out", "a"), "--criteria"),
-        (("plan", "irb120", "--criteria", "ap", "--cube", "none.yaml", "--out", "a"), "none.yaml"),
-        (("simulate", "kr5", "--plan", "plan.yaml", "--out", "a"), "--plan"),
-        (("simulate", "irb120", "--plan", "plan.yaml", "--rate", "1", "--out", "a"), "--rate"),
-        (("evaluate", "plan.yaml", "--out", "a"), "--poses"),
-        (("evaluate", "plan.yaml", "--poses", "none.csv", "--out", "a"), "none.csv"),
-        (("evaluate", "plan.yaml", "--forces", "forces.csv", "--out", "a"), "--alignment"),
-        (("evaluate", "plan.yaml", "--poses", "poses.csv", "--noise", "0", "--out", "a"), "--noise"),
-    ],
-)
-def test_what_cannot_be_used_is_refused_by_its_option(
-    truearm: Truearm, folder: Path, words: tuple[str, ...], said: str
-) -> None:
-    run = truearm("iso9283", *words)
-    assert run.code == 2
-    assert said in run.err
-    assert not (folder / "a").exists()

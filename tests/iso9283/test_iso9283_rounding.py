@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.iso9283.known_motions import PLAN, cornering, found, said
 from tests.moving_tip import ALONG, CENTRE, HERE, along, duration_of, plan_of, ramp, samples_of, the, times
 
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
-from truearm.iso9283.criteria.alignment import Alignment
 from truearm.iso9283.criteria.corners import corner_values
 from truearm.iso9283.criteria.rows import Instrument
 from truearm.iso9283.criteria.runs import refuse_wild, wild_steps
@@ -19,20 +19,14 @@ from truearm.iso9283.criteria.settling import settling_values
 from truearm.iso9283.criteria.streams import clock_of
 from truearm.iso9283.criteria.velocity import velocity_values
 from truearm.iso9283.evaluating.doubts import unusual_samples
-from truearm.iso9283.evaluating.evaluation import Evaluation
 from truearm.iso9283.evaluating.reading import read_attained_poses
 from truearm.iso9283.evaluating.samples import read_settling_samples
-from truearm.iso9283.evaluating.told import said_of_rounding, said_of_streams
+from truearm.iso9283.evaluating.told import said_of_rounding
 from truearm.iso9283.planning.criteria import Way
 from truearm.iso9283.planning.records import Samples, resolution_of
 
-PLAN = plan_of()
 FAST = plan_of(velocity=1.0)
 LENGTH = Way(FAST.paths["line"]).length
-
-
-def found(**parts: object) -> Evaluation:
-    return Evaluation((), Alignment.__new__(Alignment), **parts)  # type: ignore[arg-type]
 
 
 # -- the clock -----------------------------------------------------------------------------------------
@@ -113,14 +107,14 @@ def test_times_too_coarse_to_say_how_fast_the_tip_is_are_refused_as_such() -> No
 
 def test_times_that_are_the_same_by_rounding_are_not_called_written_twice(tmp_path: Path) -> None:
     file = tmp_path / "settling.csv"
-    rows = [f"t,P1,1,{0.004 * k:.2f},{k},0,0" for k in range(100)]
-    file.write_text("criterion,pose,cycle,time [s],x [mm],y [mm],z [mm]\n" + "\n".join(rows) + "\n")
-    with pytest.raises(InputError, match=r"rounded so coarsely.*more decimals"):
-        read_settling_samples(file)
-    rows = [f"t,P1,1,{0.004 * (k - (k > 50)):.3f},{k},0,0" for k in range(100)]
-    file.write_text("criterion,pose,cycle,time [s],x [mm],y [mm],z [mm]\n" + "\n".join(rows) + "\n")
-    with pytest.raises(InputError, match="written twice"):
-        read_settling_samples(file)
+    head = "criterion,pose,cycle,time [s],x [mm],y [mm],z [mm]"
+    coarse = [f"{0.004 * k:.2f}" for k in range(100)]
+    twice = [f"{0.004 * (k - (k > 50)):.3f}" for k in range(100)]
+    for stamps, text in ((coarse, r"rounded so coarsely.*more decimals"), (twice, "written twice")):
+        rows = [f"t,P1,1,{time},{k},0,0" for k, time in enumerate(stamps)]
+        file.write_text("\n".join([head, *rows]) + "\n")
+        with pytest.raises(InputError, match=text):
+            read_settling_samples(file)
 
 
 # -- the resolution of readings ------------------------------------------------------------------------
@@ -181,47 +175,21 @@ def resting(seed: int, step: float) -> Samples:
 
 
 def test_the_last_digit_of_a_rounded_record_is_nothing_unusual() -> None:
-    named = 0
     for seed in range(4):
         samples = resting(seed, 1e-5)
         _, curves = settling_values(PLAN, samples, HERE, Instrument(1e-5))
         readings = {"settling": Instrument(1e-5).reading(samples.resolution)}
-        told: dict[str, Notice] = {
-            one.code: one for one in said_of_streams(found(settling=tuple(curves), readings=readings))
-        }
-        named += "unusual-samples" in told
-    assert named == 0
+        assert "unusual-samples" not in said(settling=tuple(curves), readings=readings), seed
 
 
 # -- a corner that is an arc ---------------------------------------------------------------------------
 
 
-def round_corners(seed: int, radius: float) -> Samples:
-    """Return cycles of the rectangle whose corners are arcs that touch both sides."""
-    rng = np.random.default_rng(seed)
-    way = Way(FAST.paths["rectangle"])
-    corners = way.points if hasattr(way, "points") else FAST.paths["rectangle"].points
-    points = [corners[0]]
-    for before, here, after in zip(corners[:-2], corners[1:-1], corners[2:], strict=True):
-        a, b = ((one - here) / np.linalg.norm(one - here) for one in (before, after))
-        for angle in np.linspace(0.0, np.pi / 2, 400):
-            points.append(here + radius * ((1 - np.cos(angle)) * b + (1 - np.sin(angle)) * a))
-    points.append(corners[-1])
-    drawn = np.array(points)
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(drawn, axis=0), axis=1))])
-    rows = []
-    for k in (1, 2, 3):
-        t = times(duration_of(s[-1], 1.0), 1000.0) + rng.random() * 1e-3
-        u = ramp(t, s[-1], 1.0)
-        x = np.column_stack([np.interp(u, s, drawn[:, axis]) for axis in range(3)])
-        rows.append((k, t, x + rng.normal(0.0, 5e-6, x.shape)))
-    return samples_of("CR", "rectangle", rows)
-
-
 def test_arcs_round_corners_have_no_unusual_samples_and_a_spike_beside_them_has() -> None:
     for seed in range(6):
-        _, corners = corner_values(FAST, round_corners(seed, 0.02), HERE, Instrument(5e-6))
-        assert "unusual-samples" not in {one.code for one in said_of_streams(found(corners=tuple(corners)))}
+        samples = cornering(0.02, plan=FAST, rate=1000.0, sigma=5e-6, seed=seed, apart=0.37)
+        _, corners = corner_values(FAST, samples, HERE, Instrument(5e-6))
+        assert "unusual-samples" not in said(corners=tuple(corners)), seed
     cycles = corners[0].run.cycles
     moved = [cycle.position.copy() for cycle in cycles]
     row = int(np.searchsorted(cycles[1].along, 0.1))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -23,9 +23,10 @@ from truearm.engine.robot.transform import (
     rotation_from_vector,
 )
 from truearm.iso9283.criteria.alignment import Alignment
-from truearm.iso9283.criteria.rows import Instrument, cycles_of, refuse_copied_poses
-from truearm.iso9283.criteria.wild_rows import UnusualRows, unusual_rows
+from truearm.iso9283.criteria.rows import Cycles, Instrument, cycles_of, refuse_copied_poses, refuse_far_orientations
+from truearm.iso9283.criteria.wild_rows import UnusualRows, alike_cycles, unusual_rows
 from truearm.iso9283.evaluating.evaluation import Evaluation, Measurements, evaluated
+from truearm.iso9283.evaluating.table import row_notices
 from truearm.iso9283.planning.criteria import PerformancePlan
 from truearm.iso9283.planning.records import AttainedPoses, Names
 
@@ -56,8 +57,7 @@ def campaign(seed: int = 1, tests: tuple[str, ...] = TESTS) -> tuple[Performance
             for cycle in range(1, test.cycles + 1)
         ]
     plan = dataclasses.replace(
-        plan,
-        tests=tuple(t if t.id in ("AP", "AD") else dataclasses.replace(t, velocities=(1.0,)) for t in plan.tests),
+        plan, tests=tuple(t if t.id in ("AP", "AD") else dataclasses.replace(t, velocities=(1.0,)) for t in plan.tests)
     )
     criterion, robot, pose, cycle, approach, velocity, time = zip(*keys, strict=True)
     n = len(keys)
@@ -221,32 +221,27 @@ def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> Att
     if isinstance(column, Names):
         texts = [column.names[code] for code in column.code]
         texts[row] = str(value)
-        new: dict[str, Any] = {name: Names.of(texts)}
-        return dataclasses.replace(read, **new)
-    column = column.copy()
-    column[row] = value
-    new = {name: column}
+        column = Names.of(texts)
+    else:
+        column = column.copy()
+        column[row] = value
+    new: dict[str, Any] = {name: column}
     return dataclasses.replace(read, **new)
 
 
 @pytest.mark.parametrize(
-    ("change", "text"),
+    ("column", "value", "text"),
     [
-        (lambda r: changed(r, "velocity", 3, 0.01), "line 5, column velocity: 1 row of the test AP"),
-        (lambda r: changed(r, "velocity", 3, 0.995), "99.5 %"),
-        (lambda r: changed(r, "load", 3, 0.5), "line 5, column load: 1 row of the test AP"),
-        (
-            lambda r: changed(r, "robot", 3, "irb12O"),
-            "line 5, column robot: the robot is named in some rows of the test AP and in others not",
-        ),
+        ("velocity", 0.01, "line 5, column velocity: 1 row of the test AP"),
+        ("velocity", 0.995, "99.5 %"),
+        ("load", 0.5, "line 5, column load: 1 row of the test AP"),
+        ("robot", "irb12O", "line 5, column robot: the robot is named in some rows of the test AP and in others not"),
     ],
 )
-def test_rows_under_conditions_that_were_not_planned_are_refused(
-    change: Callable[[AttainedPoses], AttainedPoses], text: str
-) -> None:
+def test_rows_under_conditions_that_were_not_planned_are_refused(column: str, value: float | str, text: str) -> None:
     plan, read = campaign(1, ("AP",))
     with pytest.raises(InputError, match=re.escape(text)):
-        found(plan, change(read))
+        found(plan, changed(read, column, 3, value))
 
 
 def test_rounded_velocities_are_those_of_the_plan() -> None:
@@ -333,3 +328,98 @@ def test_places_without_a_row_are_told() -> None:
     kept = np.setdiff1d(np.arange(len(read.cycle)), np.concatenate(drop))
     made = found(plan, in_order(read, kept))
     assert made.missing == ("AP: P3", "AP: P4 at 100 %", "vAP: P2 from y", "E: 1 of 5 robots")
+
+
+def group(points: Array, pose: str = "P1", test: str = "AP") -> Cycles:
+    n = len(points)
+    number = np.arange(1, n + 1)
+    return Cycles(
+        test, "", pose, "", 1.0, 1.0, number, np.full(n, np.nan), 1e-5 * points, None, np.zeros(3), number + 1
+    )
+
+
+def creeping_campaign(rng: np.random.Generator, share: float, common: float = 0.0, test: str = "AP") -> list[Cycles]:
+    """Return five poses of thirty cycles; each is a share of the one before, and moves with the others by an amount."""
+    together = common * rng.standard_normal((30, 3))
+    made = []
+    for k in range(1, 6):
+        points = rng.standard_normal((30, 3)) * [3.0, 1.0, 0.3] + together
+        for row in range(1, 30):
+            points[row] = share * points[row - 1] + np.sqrt(1 - share**2) * points[row]
+        made.append(group(points, f"P{k}", test))
+    return made
+
+
+def test_cycles_that_creep_are_said_with_their_correlation() -> None:
+    rng = np.random.default_rng(0)
+    unusual = unusual_rows(creeping_campaign(rng, 0.8), Instrument(1e-6))
+    (one,) = unusual.alike
+    assert 0.5 < one.correlation < 0.95
+    found = Evaluation((), Alignment.__new__(Alignment), unusual=unusual)
+    (notice,) = (notice for notice in row_notices(found) if notice.code == "cycles-alike")
+    assert notice.level == "warning"
+    assert f"AP, 100 %, load 100 % (correlation {one.correlation:.2f}" in notice.message
+
+
+def test_independent_cycles_are_seldom_said_even_if_all_poses_move_together() -> None:
+    rng = np.random.default_rng(1)
+    for common in (0.0, 3.0):
+        said = sum(bool(alike_cycles(creeping_campaign(rng, 0.0, common))) for _ in range(300))
+        assert said <= 8  # 1 %, and what chance adds to it
+
+
+def test_few_cycles_drift_and_points_without_scatter_are_not_judged() -> None:
+    rng = np.random.default_rng(2)
+    creeping = creeping_campaign(rng, 0.9)
+    assert alike_cycles([one.rows(slice(0, 9)) for one in creeping]) == ()
+    assert alike_cycles([replace(one, test="dAP") for one in creeping]) == ()
+    assert alike_cycles([group(np.ones((30, 3)))]) == ()
+    # cycles that only some poses have are left aside
+    assert len(alike_cycles([creeping[0].rows(slice(3, None)), *creeping[1:]])) == 1
+
+
+N = 40
+TURN = rotation_from_vector(np.array([0.3, -1.2, 0.8]))
+_RNG = np.random.default_rng(1)
+COMMANDED = rotation_from_vector([0.0, 2.5, 0.4] + 0.2 * _RNG.standard_normal((N, 3)))
+ATTAINED = rotation_from_vector(2e-3 * _RNG.standard_normal((N, 3))) @ COMMANDED
+#: What the instrument reads.
+READ = TURN.T @ ATTAINED
+
+
+def refused(read: Array, commanded: Array = COMMANDED) -> str:
+    with pytest.raises(InputError) as refusal:
+        refuse_far_orientations(TURN @ read, commanded, TURN, np.arange(2, N + 2), "poses.csv")
+    return str(refusal.value)
+
+
+def test_what_robots_attain_passes_for_many_commands_and_for_one() -> None:
+    refuse_far_orientations(ATTAINED, COMMANDED, TURN, np.arange(N), "poses.csv")
+    nine = rotation_from_vector(np.radians([9.0, 0, 0])) @ COMMANDED[:1]
+    refuse_far_orientations(nine, COMMANDED[0], TURN, np.arange(1), "poses.csv")
+    far = rotation_from_vector(np.radians([11.0, 0, 0])) @ COMMANDED[:1]
+    with pytest.raises(InputError, match=r"11\.0 deg off"):
+        refuse_far_orientations(far, COMMANDED[0], TURN, np.arange(1), "poses.csv")
+
+
+def test_quaternions_in_the_order_x_y_z_w_are_recognised() -> None:
+    q = quaternion_from_rotation(READ)
+    text = refused(rotation_from_quaternion(np.roll(q, -1, axis=1)))
+    assert "in the order x, y, z, w" in text
+    assert f"{N} of {N} orientations" in text
+    assert "line 2, columns qw to qz" in text
+
+
+def test_inverse_rotations_and_frames_taken_for_others_are_recognised() -> None:
+    assert "The inverse rotations fit" in refused(READ.swapaxes(1, 2))
+    assert "All are turned alike" in refused(READ @ rotation_from_vector(np.radians([0, 0, 90.0])))
+    assert "Check that the columns" in refused(rotation_from_vector(_RNG.standard_normal((N, 3))) @ READ)
+
+
+def test_a_single_row_is_named() -> None:
+    read = READ.copy()
+    read[7] = rotation_from_vector(np.radians([0, 40.0, 0])) @ read[7]
+    text = refused(read)
+    assert f"1 of {N} orientations" in text
+    assert "line 9" in text
+    assert "Look at the record" in text

@@ -6,25 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.moving_tip import (
-    ALONG,
-    CENTRE,
-    EXACT,
-    HERE,
-    NORMAL,
-    TRACKER,
-    along,
-    plan_of,
-    ramp,
-    samples_of,
-    stream_of,
-    the,
-    times,
-)
+from tests.iso9283.known_motions import LENGTH, PLAN, V, cornering, damped, part, runs, said, said_of_paths, to_rest
+from tests.moving_tip import CENTRE, EXACT, HERE, NORMAL, TRACKER, along, samples_of, stream_of, the, times
 
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.robot.chain import Array
-from truearm.iso9283.criteria.alignment import Alignment
 from truearm.iso9283.criteria.corners import corner_values
 from truearm.iso9283.criteria.paths import path_values
 from truearm.iso9283.criteria.rows import Instrument, copied_blocks
@@ -33,33 +19,18 @@ from truearm.iso9283.criteria.settling import settling_values
 from truearm.iso9283.criteria.velocity import velocity_values
 from truearm.iso9283.evaluating.doubts import unusual_samples
 from truearm.iso9283.evaluating.evaluate import value_summary
-from truearm.iso9283.evaluating.evaluation import Evaluation
 from truearm.iso9283.evaluating.table import copied_notices
-from truearm.iso9283.evaluating.told import said_of_streams
 from truearm.iso9283.planning.criteria import Way
 from truearm.iso9283.planning.records import Samples
 
-PLAN = plan_of()
-V = PLAN.rated_velocity
-LENGTH = Way(PLAN.paths["line"]).length
-
-
-def runs(*, rate: float = 100.0, cycles: int = 5, sigma: float = 0.02e-3, shape: str = "line") -> Samples:
-    """Return cycles of a path with noise, each from rest to rest."""
-    rng = np.random.default_rng(4)
-    length = Way(PLAN.paths[shape]).length
-    t = times(length / V + 0.4, rate)
-    p = along(PLAN, shape, ramp(t - 0.1, length, V))
-    return samples_of("AT", shape, [(k + 1, t, p + rng.normal(0.0, sigma, p.shape)) for k in range(cycles)])
+DAMPING = 0.4
 
 
 def resting(rate: float = 500.0, sigma: float = 5e-6) -> Samples:
     """Return three cycles that come to rest from 50 mm away."""
-    rng = np.random.default_rng(4)
     t = times(2.0, rate)
-    x = 0.05 * np.exp(-10 * np.maximum(t - 0.2, 0.0)) * (1 + 10 * np.maximum(t - 0.2, 0.0))
-    p = CENTRE + np.outer(x, ALONG)
-    return samples_of("t", "P1", [(k, t, p + rng.normal(0.0, sigma, p.shape)) for k in (1, 2, 3)])
+    tau = 10 * np.maximum(t - 0.2, 0.0)
+    return to_rest(0.05 * np.exp(-tau) * (1 + tau), t, sigma=sigma, seed=4)
 
 
 def moved(samples: Samples, rows: list[int] | slice, by: float) -> Samples:
@@ -72,16 +43,6 @@ def refusal_of_path(samples: Samples) -> str:
     with pytest.raises(InputError) as caught:
         path_values(PLAN, samples, HERE, TRACKER)
     return str(caught.value)
-
-
-def said(**parts: object) -> dict[str, Notice]:
-    """Return what is said of curves of some criteria, by its code."""
-    found = Evaluation((), Alignment.__new__(Alignment), **parts)  # type: ignore[arg-type]
-    return {notice.code: notice for notice in said_of_streams(found)}
-
-
-def said_of_paths(samples: Samples) -> dict[str, Notice]:
-    return said(deviations=tuple(path_values(PLAN, samples, HERE, TRACKER)[1]))
 
 
 def said_of_settling(samples: Samples) -> dict[str, Notice]:
@@ -99,46 +60,33 @@ def test_a_sample_where_no_tip_can_have_been_is_refused_by_its_line(rate: float)
     assert f"paths.csv, line {row + 2}: cycle 3 of AT on line has samples where no tip can have been" in text
     assert "got '800" in text
     assert "Remove these lines: samples may be missing" in text
-    kept = np.arange(len(samples.time)) != row
-    fewer = samples_of(
-        "AT",
-        "line",
-        [
-            (k, samples.time[kept & (samples.cycle == k)], samples.position[kept & (samples.cycle == k)])
-            for k in range(1, 6)
-        ],
-    )
+    fewer = part(samples, np.arange(len(samples.time)) != row)
     assert the(path_values(PLAN, fewer, HERE, TRACKER)[0], "AT").value < 0.1e-3
 
 
 def test_wild_samples_in_a_row_in_several_places_and_at_both_ends_are_named() -> None:
     samples = runs()
-    assert "lines 52 to 56: cycle 1" in refusal_of_path(moved(samples, slice(50, 55), 0.3))
     last = int((samples.cycle == 1).sum()) - 1
-    assert "line 2: cycle 1" in refusal_of_path(moved(samples, [0], 0.3))
-    assert f"line {last + 2}: cycle 1" in refusal_of_path(moved(samples, [last], 0.3))
-    text = refusal_of_path(moved(samples, [30, 60, 90, 120, 150], 0.3))
-    assert "line 32, line 62, line 92 and 2 more such places" in text
     stream = replace(samples, cycle=0 * samples.cycle, time=samples.time + 10.0 * samples.cycle)
-    assert "line 52: the stream of AT on line" in refusal_of_path(moved(stream, [50], 0.3))
+    for read, rows, words in (
+        (samples, slice(50, 55), "lines 52 to 56: cycle 1"),
+        (samples, [0], "line 2: cycle 1"),
+        (samples, [last], f"line {last + 2}: cycle 1"),
+        (samples, [30, 60, 90, 120, 150], "line 32, line 62, line 92 and 2 more such places"),
+        (stream, [50], "line 52: the stream of AT on line"),
+    ):
+        assert words in refusal_of_path(moved(read, rows, 0.3))
 
 
-def test_a_record_that_jumps_and_stays_there_is_to_be_measured_again() -> None:
+def test_a_record_that_jumps_and_stays_or_is_wild_all_over_is_refused() -> None:
     samples = runs()
     text = refusal_of_path(moved(samples, slice(60, int((samples.cycle == 1).sum())), 0.03))
     assert "lines 61 and 62: cycle 1 of AT on line jumps" in text
     assert "Check that times are in seconds." in text
     assert "measure the cycle again" in text
-
-
-def test_a_record_that_is_wild_all_over_is_refused() -> None:
-    samples = runs()
     rng = np.random.default_rng(0)
-    position = (
-        samples.position
-        + 0.05 * rng.normal(size=samples.position.shape) * (rng.random(len(samples.time)) < 0.1)[:, None]
-    )
-    assert "no tip can have been" in refusal_of_path(replace(samples, position=position))
+    off = 0.05 * rng.normal(size=samples.position.shape) * (rng.random(len(samples.time)) < 0.1)[:, None]
+    assert "no tip can have been" in refusal_of_path(replace(samples, position=samples.position + off))
 
 
 def test_a_wild_sample_on_the_way_to_rest_is_refused() -> None:
@@ -177,28 +125,28 @@ def test_many_unusual_samples_are_counted() -> None:
 
 
 def test_what_all_cycles_have_is_not_unusual_nor_anything_of_two_cycles() -> None:
-    samples = runs(cycles=2)
-    assert not said_of_paths(moved(samples, [60], 1e-3))
+    assert not said_of_paths(moved(runs(cycles=2), [60], 1e-3))
     samples = runs()
     everywhere = [60 + k * int((samples.cycle == 1).sum()) for k in range(5)]
     assert not said_of_paths(moved(samples, everywhere, 2e-3))
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_clean_streams_have_no_unusual_sample(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    rate = (25.0, 50.0, 100.0, 250.0)[seed % 4]
-    name = ("rectangle", "line", "large-circle")[seed % 3]
-    length = Way(PLAN.paths[name]).length
+def test_clean_streams_have_no_unusual_sample() -> None:
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        rate = (25.0, 50.0, 100.0, 250.0)[seed % 4]
+        name = ("rectangle", "line", "large-circle")[seed % 3]
+        wave = 2 * np.pi / Way(PLAN.paths[name]).length
 
-    def aside(s: Array) -> Array:
-        return np.outer(3e-4 * np.sin(2 * np.pi * s / length), NORMAL)
+        def aside(s: Array, wave: float = wave) -> Array:
+            return np.outer(3e-4 * np.sin(wave * s), NORMAL)
 
-    t, p, _ = stream_of(PLAN, name, rate, rng, cycles=5, offset=aside, velocity=V, sigma=(2e-5, 1e-4)[seed % 2])
-    (run,) = runs_of(PLAN, samples_of("AT", name, [(0, t, p)]), HERE, "AT")
-    assert len(run.cycles) == 5
-    cycles = run.cycles
-    assert not unusual_samples([c.time for c in cycles], [c.position for c in cycles], [c.along for c in cycles])
+        t, p, _ = stream_of(PLAN, name, rate, rng, cycles=5, offset=aside, velocity=V, sigma=(2e-5, 1e-4)[seed % 2])
+        (run,) = runs_of(PLAN, samples_of("AT", name, [(0, t, p)]), HERE, "AT")
+        cycles = run.cycles
+        assert len(cycles) == 5, seed
+        told = unusual_samples([c.time for c in cycles], [c.position for c in cycles], [c.along for c in cycles])
+        assert not told, seed
 
 
 # -- cycles as a whole ---------------------------------------------------------------------------------
@@ -213,57 +161,39 @@ def test_a_cycle_that_lies_apart_as_a_whole_is_said_with_what_is_without_it() ->
     assert "without it 0.0" in notice.message
 
 
-@pytest.mark.parametrize("scale", [1e-5, 1e-3])
-def test_cycles_that_scatter_are_not_wild(scale: float) -> None:
+def test_cycles_that_scatter_are_not_wild() -> None:
     rng = np.random.default_rng(1)
     samples = runs(cycles=10, shape="small-circle")  # the shortest path
-    for _ in range(20):
-        off = scale * rng.standard_normal((11, 3))
-        assert "wild-cycle" not in said_of_paths(replace(samples, position=samples.position + off[samples.cycle]))
+    for scale in (1e-5, 1e-3):
+        for _ in range(20):
+            off = scale * rng.standard_normal((11, 3))[samples.cycle]
+            assert "wild-cycle" not in said_of_paths(replace(samples, position=samples.position + off)), scale
 
 
 def test_samples_that_are_missing_on_a_part_of_the_way_are_said() -> None:
     samples = runs()
-    kept = np.ones(len(samples.time), bool)
-    kept[100:130] = False
-    rows = [
-        (k, samples.time[kept & (samples.cycle == k)], samples.position[kept & (samples.cycle == k)])
-        for k in range(1, 6)
-    ]
-    notice = said_of_paths(samples_of("AT", "line", rows))["gap-in-path"]
+    rows = np.arange(len(samples.time))
+    notice = said_of_paths(part(samples, (rows < 100) | (rows >= 130)))["gap-in-path"]
     assert notice.level == "warning"
     assert "77.5 mm between lines 101 and 102 (cycle 1 of AT on line)" in notice.message
-    rng = np.random.default_rng(0)
-    lost = rng.random(len(samples.time)) < 0.2
-    rows = [
-        (k, samples.time[~lost & (samples.cycle == k)], samples.position[~lost & (samples.cycle == k)])
-        for k in range(1, 6)
-    ]
-    assert not said_of_paths(samples_of("AT", "line", rows))
+    lost = np.random.default_rng(0).random(len(rows)) < 0.2
+    assert not said_of_paths(part(samples, ~lost))
 
 
-def test_two_runs_under_one_number_are_refused() -> None:
+def test_two_runs_or_ways_to_rest_under_one_number_are_refused() -> None:
     samples = runs()
-    twice = samples.cycle <= 2
+    t, p = samples.time[samples.cycle == 1], samples.position[samples.cycle == 1]
+    second = samples.position[samples.cycle == 2]
     # the way back lies between the two
-    back = samples.position[samples.cycle == 1][::-1] + 0.05 * NORMAL
-    t, p = samples.time[samples.cycle == 1], samples.position[twice]
-    n = len(t)
-    position = np.concatenate([p[:n], back, p[n:]])
-    time = np.concatenate([t, t + 3.0, t + 6.0])
-    text = refusal_of_path(samples_of("AT", "line", [(1, time, position)]))
+    position = np.concatenate([p, p[::-1] + 0.05 * NORMAL, second])
+    text = refusal_of_path(samples_of("AT", "line", [(1, np.concatenate([t, t + 3.0, t + 6.0]), position)]))
     assert "cycle 1 of line runs the path 2 times" in text
     assert "Number the cycles, or leave the cells" in text
-
-
-def test_two_ways_to_rest_under_one_number_are_refused() -> None:
-    samples = resting()
-    n = int((samples.cycle == 1).sum())
-    once, slower = samples.position[:n], CENTRE + 0.5 * (samples.position[:n] - CENTRE)
-    time = np.concatenate([samples.time[:n], samples.time[:n] + 3.0])
-    both = samples_of("t", "P1", [(1, time, np.concatenate([once, slower]))])
+    rest = part(resting(), resting().cycle == 1)
+    time = np.concatenate([rest.time, rest.time + 3.0])
+    both = np.concatenate([rest.position, CENTRE + 0.5 * (rest.position - CENTRE)])
     with pytest.raises(InputError, match=r"about line \d+: the tip goes away again after it came to rest; got '2[45]"):
-        settling_values(PLAN, both, HERE, EXACT)
+        settling_values(PLAN, samples_of("t", "P1", [(1, time, both)]), HERE, EXACT)
 
 
 # -- coming to rest ------------------------------------------------------------------------------------
@@ -274,61 +204,63 @@ def test_the_begin_of_a_motion_is_found_whatever_power_of_time_it_grows_with(pow
     t = times(3.0, rate)
     tau = np.maximum(t - 0.3, 0.0)
     x = np.where(tau < 0.2, 0.05 * (tau / 0.2) ** power, 0.1 - 0.05 * np.exp(-(tau - 0.2) * power / 0.2))
-    samples = samples_of("posing-time", "D100", [(k, t, CENTRE + np.outer(x, ALONG)) for k in (1, 2, 3)])
-    _, curves = settling_values(PLAN, samples, HERE, EXACT)
+    _, curves = settling_values(PLAN, to_rest(x, t, test="posing-time", place="D100"), HERE, EXACT)
     assert [curve.start for curve in curves] == pytest.approx([0.3] * 3, abs=1e-3)
 
 
 def test_the_begin_of_a_gentle_motion_is_found_in_noise() -> None:
-    rng = np.random.default_rng(5)
     t = times(3.0, 1000.0)
     tau = np.clip(t - 0.3, 0.0, 0.4)
     x = 0.05 * (tau / 0.2) ** 3 * (tau < 0.2) + (tau >= 0.2) * (0.1 - 0.05 * (2 - tau / 0.2) ** 3)
-    samples = samples_of(
-        "posing-time",
-        "D100",
-        [(k, t, CENTRE + np.outer(x, ALONG) + rng.normal(0, 1e-5, (len(t), 3))) for k in range(1, 7)],
-    )
+    samples = to_rest(x, t, test="posing-time", place="D100", sigma=1e-5, seed=5, cycles=6)
     _, curves = settling_values(PLAN, samples, HERE, Instrument(1e-5))
     assert np.mean([curve.start for curve in curves]) == pytest.approx(0.3, abs=5e-3)
 
 
-def ringing(rate: float, hertz: float, sigma: float, *, amplitude: float = 5e-3, damping: float = 0.4) -> Samples:
+def ringing(rate: float, sigma: float, *, amplitude: float = 5e-3) -> Samples:
     """Return cycles of a damped oscillation, each sampled at other times."""
-    rng = np.random.default_rng(2)
-    w = 2 * np.pi * hertz
-    d = w * np.sqrt(1 - damping**2)
-    rows = []
+    rng, rows = np.random.default_rng(2), []
     for k in (1, 2, 3):
         t = times(1.5, rate) + k / 3 / rate
-        tau = np.maximum(t - 0.1, 0.0)
-        x = amplitude * np.exp(-damping * w * tau) * (np.cos(d * tau) + damping * w / d * np.sin(d * tau))
-        rows.append((k, t, CENTRE + np.outer(x, ALONG) + rng.normal(0.0, sigma, (len(t), 3))))
+        one = to_rest(damped(t - 0.1, amplitude, 8.0, DAMPING), t, cycles=1)
+        rows.append((k, t, one.position + rng.normal(0.0, sigma, one.position.shape)))
     return samples_of("t", "P1", rows)
 
 
 def test_noise_makes_an_overshoot_little_larger() -> None:
-    true = 5e-3 * np.exp(-0.4 * np.pi / np.sqrt(1 - 0.4**2))
-    values, curves = settling_values(PLAN, ringing(1000.0, 8.0, 1e-5), HERE, Instrument(1e-5))
+    true = 5e-3 * np.exp(-DAMPING * np.pi / np.sqrt(1 - DAMPING**2))
+    values, curves = settling_values(PLAN, ringing(1000.0, 1e-5), HERE, Instrument(1e-5))
     assert the(values, "OV").value == pytest.approx(true, rel=0.01)
     assert the(values, "OV").value < max(curve.distance[curve.time > 0.16].max() for curve in curves)
 
 
 @pytest.mark.parametrize(("rate", "status"), [(500.0, "measured"), (50.0, "instrument-too-coarse")])
 def test_an_oscillation_with_fewer_than_eight_samples_a_period_is_marked(rate: float, status: str) -> None:
-    values, curves = settling_values(PLAN, ringing(rate, 8.0, 0.0), HERE, EXACT)
+    values, curves = settling_values(PLAN, ringing(rate, 0.0), HERE, EXACT)
     assert {value.status for value in values} == {status}
     assert ("sampled-too-slowly" in said(settling=tuple(curves))) == (status != "measured")
 
 
 def test_an_excursion_that_noise_puts_in_the_band_or_outside_is_marked() -> None:
     # the second excursion ends within noise of the band
-    damping = 0.4
-    peak = np.exp(-2 * np.pi * damping / np.sqrt(1 - damping**2))
+    peak = np.exp(-2 * np.pi * DAMPING / np.sqrt(1 - DAMPING**2))
     for sigma, status in ((0.0, "measured"), (5e-6, "instrument-too-coarse")):
-        samples = ringing(250.0, 8.0, sigma, amplitude=1.02 * PLAN.limit_band / peak, damping=damping)
+        samples = ringing(250.0, sigma, amplitude=1.02 * PLAN.limit_band / peak)
         values, _ = settling_values(PLAN, samples, HERE, Instrument(sigma))
         assert the(values, "t").status == status
+
+
+def test_a_path_at_a_third_of_the_velocity_is_said_and_a_small_circle_or_a_pause_is_not() -> None:
+    samples = runs()
+    notice = said_of_paths(replace(samples, time=3 * samples.time))["slow-path"]
+    assert notice.level == "warning"
+    assert "AT on line at 83." in notice.message
+    assert "of 250 mm/s" in notice.message
+    circle = runs(shape="small-circle")
+    assert not said_of_paths(replace(circle, time=3 * circle.time))
+    t = times(LENGTH / V + 4.0, 100.0)
+    s = np.where(t < 0.5, V * t, np.where(t < 4.5, V * 0.5, V * (t - 4.0)))
+    assert not said_of_paths(samples_of("AT", "line", [(1, t, along(PLAN, "line", s))]))
 
 
 # -- times of another unit -----------------------------------------------------------------------------
@@ -344,25 +276,6 @@ def test_times_of_another_unit_are_refused(factor: float, word: str) -> None:
     word = {"slower": "more slowly", "faster": "faster"}[word]
     with pytest.raises(InputError, match=rf"the tip would move {word} than any robot's.*Write the times in seconds"):
         settling_values(PLAN, replace(rest, time=rest.time * factor * (10 if factor > 1 else 0.1)), HERE, EXACT)
-
-
-def test_a_path_at_a_third_of_the_velocity_is_said_and_a_small_circle_is_not() -> None:
-    samples = runs()
-    slow = replace(samples, time=3 * samples.time)
-    notice = said_of_paths(slow)["slow-path"]
-    assert (notice.level, "AT on line at 83." in notice.message, "of 250 mm/s" in notice.message) == (
-        "warning",
-        True,
-        True,
-    )
-    circle = runs(shape="small-circle")
-    assert not said_of_paths(replace(circle, time=3 * circle.time))
-
-
-def test_a_pause_on_the_way_is_no_slow_path() -> None:
-    t = times(LENGTH / V + 4.0, 100.0)
-    s = np.where(t < 0.5, V * t, np.where(t < 4.5, V * 0.5, V * (t - 4.0)))
-    assert not said_of_paths(samples_of("AT", "line", [(1, t, along(PLAN, "line", s))]))
 
 
 def test_orientations_in_another_order_are_refused() -> None:
@@ -389,32 +302,9 @@ def test_samples_that_two_cycles_share_are_named() -> None:
     assert copied_blocks(replace(samples, position=position)) == ()
 
 
-# -- samples that are too far apart --------------------------------------------------------------------
-
-
-def cornering(rate: float, radius: float) -> Samples:
-    """Return cycles of the rectangle with corners cut by an arc, sampled at other places in each cycle."""
-    points = PLAN.paths["rectangle"].points
-    way = [points[0]]
-    for k in (1, 2, 3):
-        u, w = (points[k] - points[k - 1], points[k + 1] - points[k])
-        u, w = u / np.linalg.norm(u), w / np.linalg.norm(w)
-        angle = np.linspace(0.0, np.pi / 2, 200)
-        way += list(
-            points[k] - radius * u + radius * w + radius * (np.outer(np.sin(angle), u) - np.outer(np.cos(angle), w))
-        )
-    line = np.array([*way, points[4]])
-    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    rows = []
-    for k in range(3):
-        t = times(run[-1] / V * 1.02, rate) + k / 3 / rate
-        rows.append((k + 1, t, np.column_stack([np.interp(V * t, run, line[:, axis]) for axis in range(3)])))
-    return samples_of("CR", "rectangle", rows)
-
-
 @pytest.mark.parametrize(("rate", "status"), [(250.0, "measured"), (12.5, "instrument-too-coarse")])
 def test_corners_between_samples_are_marked(rate: float, status: str) -> None:
-    values, corners = corner_values(PLAN, cornering(rate, 0.01), HERE, EXACT)
+    values, corners = corner_values(PLAN, cornering(0.01, rate=rate, apart=1 / 3), HERE, EXACT)
     assert {value.status for value in values} == {status}
     if status == "measured":
         assert the(values, "CR", where="rectangle E3").value == pytest.approx((np.sqrt(2) - 1) * 0.01, rel=0.03)
@@ -432,12 +322,11 @@ def test_a_path_with_fewer_samples_than_half_of_the_stations_is_marked() -> None
 
 
 def test_a_corner_of_a_path_that_lies_beside_is_said_with_its_own() -> None:
-    samples = cornering(500.0, 0.005)
+    samples = cornering(0.005, apart=1 / 3)
     values, corners = corner_values(PLAN, samples, HERE, EXACT)
     assert not said(corners=tuple(corners))
     off = np.array([1e-3, 0.0, 0.0]) + 2e-3 * NORMAL
-    beside = replace(samples, position=samples.position + off)
-    _, corners = corner_values(PLAN, beside, HERE, EXACT)
+    _, corners = corner_values(PLAN, replace(samples, position=samples.position + off), HERE, EXACT)
     for corner in corners:
         assert corner.aside == pytest.approx(np.tile(off, (3, 1)), abs=1e-6)
         assert corner.own == pytest.approx(the(values, "CR", where=corner.where).value, rel=0.02)

@@ -131,7 +131,9 @@ WAITS = {
 
 
 @pytest.mark.parametrize("name", BY_NAME)
-def test_the_robot_stops_before_each_wait(name: str, programs: dict[str, MotionProgram]) -> None:
+def test_the_robot_stops_before_each_wait_and_says_where_it_is(name: str, programs: dict[str, MotionProgram]) -> None:
+    stops = re.findall(r"To (\S+)", text_of(name, programs["AP_10"]))
+    assert stops == ["P1", *["P5", "P4", "P3", "P2", "P1"] * 2, "P1"]
     wait, stopped = WAITS[name]
     for key in ("AP_10", "AT_10", "WS_10", "REORI_10"):
         program = programs[key]
@@ -162,19 +164,15 @@ def test_speeds_and_zones_are_said(name: str, programs: dict[str, MotionProgram]
         assert any(words in line for line in lines)
 
 
-def test_yaskawa_arcs_are_separated_by_a_line_and_by_no_tag_of_newer_controllers(
-    programs: dict[str, MotionProgram],
-) -> None:
+def test_what_single_languages_ask_for(programs: dict[str, MotionProgram]) -> None:
+    # arcs of Yaskawa's are separated by a line and by no tag of newer controllers
     text = text_of("inform", programs["AT_10"])
     assert "FPT" not in text
     moves = [line.split()[0] for line in text.splitlines() if line.startswith(("MOV", "TIMER"))]
-    joined = " ".join(moves)
-    assert "MOVJ TIMER MOVC MOVC MOVC MOVL MOVC MOVC MOVC TIMER" in joined
-
-
-def test_a_staubli_speed_is_left_to_the_one_that_is_said(programs: dict[str, MotionProgram]) -> None:
-    text = text_of("val3", programs["REORI_100"])
-    assert text.count('tmax="99999" rmax="99999"') == 3
+    assert "MOVJ TIMER MOVC MOVC MOVC MOVL MOVC MOVC MOVC TIMER" in " ".join(moves)
+    assert "To start of line" in text_of("rapid", programs["AT_10"])
+    # a speed of Staubli's is left to the one that is said
+    assert text_of("val3", programs["REORI_100"]).count('tmax="99999" rmax="99999"') == 3
 
 
 def test_every_test_begins_and_ends_slowly_in_the_first_pose(programs: dict[str, MotionProgram]) -> None:
@@ -240,15 +238,6 @@ def test_cycles_go_where_the_test_asks(programs: dict[str, MotionProgram]) -> No
     assert len(pushes) == 1 + 2 * 6 * 12
 
 
-def test_every_stop_has_its_name_in_every_language(programs: dict[str, MotionProgram]) -> None:
-    for language in BY_NAME:
-        if BY_NAME[language].motion is None:
-            continue
-        stops = re.findall(r"To (\S+)", text_of(language, programs["AP_10"]))
-        assert stops == ["P1", *["P5", "P4", "P3", "P2", "P1"] * 2, "P1"], language
-    assert "To start of line" in text_of("rapid", programs["AT_10"])
-
-
 def test_the_first_run_is_at_a_tenth_and_at_most_250_mm_a_second() -> None:
     fast = measuring_programs(replace(small_plan(["AV"], velocities=(1.0, 0.1)), rated_velocity=5.0), 1.0, "abc")
     assert fast.share == pytest.approx(0.05)
@@ -301,39 +290,48 @@ def test_flange_poses_keep_the_tip_on_its_line_while_it_turns() -> None:
     assert (lengths / speeds).sum() == pytest.approx(way.length / 0.05)  # the flange takes the time of the tip
 
 
-@pytest.mark.parametrize("test", ["AT", "CR"])
-def test_a_tip_has_the_flange_where_it_brings_the_tip_there(test: str) -> None:
-    plan = with_tip(small_plan([test], cycles={test: 1}))
-    (program,) = measuring_programs(plan, 1.0, "abc").slow
-    assert program.poses is not None
-    tips = program.poses[:, :3, 3] + TIP * program.poses[:, :3, 2]
-    for corner in plan.paths["rectangle"].points:
-        assert np.linalg.norm(tips - corner, axis=1).min() < 1e-6
+def test_a_tip_has_the_flange_where_it_brings_the_tip_there() -> None:
+    for test in ("AT", "CR"):
+        plan = with_tip(small_plan([test], cycles={test: 1}))
+        (program,) = measuring_programs(plan, 1.0, "abc").slow
+        assert program.poses is not None
+        tips = program.poses[:, :3, 3] + TIP * program.poses[:, :3, 2]
+        for corner in plan.paths["rectangle"].points:
+            assert np.linalg.norm(tips - corner, axis=1).min() < 1e-6, test
 
 
 def test_what_cannot_be_gone_is_refused_with_the_move() -> None:
     plan = small_plan(["AP", "CR"])
     far = replace(plan.poses["P3"], joints=plan.poses["P3"].joints + np.radians([0, 300.0, 0, 0, 0, 0]))
-    with pytest.raises(InputError, match=r"AP, P3: a joint would go beyond its limits; got 'axis_2'"):
-        measuring_programs(replace(plan, poses={**plan.poses, "P3": far}), 1.0, "abc")
     rectangle = plan.paths["rectangle"]
-    points = rectangle.points.copy()
-    points[2] += [2.0, 0.0, 0.0]
-    away = replace(plan, paths={**plan.paths, "rectangle": replace(rectangle, points=points)})
-    with pytest.raises(InputError, match=r"CR, rectangle, move 2: the robot cannot go this way; got '?unreachable'?"):
-        measuring_programs(away, 1.0, "abc")
-    behind = points.copy()
-    behind[2] = [-0.35, 0.02, 0.35]
-    round_ = replace(plan, paths={**plan.paths, "rectangle": replace(rectangle, points=behind)})
-    with pytest.raises(InputError, match=r"CR, rectangle, move 2"):
-        measuring_programs(round_, 1.0, "abc")
-    with pytest.raises(InputError, match=r"dAP: a pose is not in the plan; got 'P2'"):
-        measuring_programs(replace(small_plan(["dAP"]), poses={"P1": plan.poses["P1"]}), 1.0, "abc")
-    kept = replace(
-        plan, paths={"line": replace(plan.paths["line"], other=None)}, tests=small_plan(["AT-reorientation"]).tests
-    )
-    with pytest.raises(InputError, match="this path has one orientation, and another is needed"):
-        measuring_programs(kept, 1.0, "abc")
+
+    def with_corner(corner: Array) -> PerformancePlan:
+        points = rectangle.points.copy()
+        points[2] = corner
+        return replace(plan, paths={**plan.paths, "rectangle": replace(rectangle, points=points)})
+
+    kept = replace(plan.paths["line"], other=None)
+    for wrong, text in (
+        (
+            replace(plan, poses={**plan.poses, "P3": far}),
+            r"AP, P3: a joint would go beyond its limits; got 'axis_2'",
+        ),
+        (
+            with_corner(rectangle.points[2] + [2.0, 0.0, 0.0]),
+            r"CR, rectangle, move 2: the robot cannot go this way; got '?unreachable'?",
+        ),
+        (with_corner(np.array([-0.35, 0.02, 0.35])), r"CR, rectangle, move 2"),
+        (
+            replace(small_plan(["dAP"]), poses={"P1": plan.poses["P1"]}),
+            r"dAP: a pose is not in the plan; got 'P2'",
+        ),
+        (
+            replace(plan, paths={"line": kept}, tests=small_plan(["AT-reorientation"]).tests),
+            "this path has one orientation, and another is needed",
+        ),
+    ):
+        with pytest.raises(InputError, match=text):
+            measuring_programs(wrong, 1.0, "abc")
 
 
 def test_only_straight_moves_need_the_frames_of_the_controller() -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tests.performance_plan import DOWN, small_plan
 
 from truearm.engine.base.errors import InputError
@@ -15,7 +14,7 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import IDENTITY, rotation_vector
 from truearm.engine.twin.truths import truth_twin
 from truearm.iso9283.planning.criteria import TURNS, PerformancePlan
-from truearm.iso9283.planning.records import Samples
+from truearm.iso9283.planning.records import AttainedPoses
 from truearm.iso9283.simulating.cell import SimulatedCampaign, Tracker, TrueRobot, simulated_campaign
 from truearm.iso9283.simulating.moving_arm import DRIVES, WARMING, ZONE, Drives, Servo
 
@@ -45,9 +44,19 @@ def in_base(position: Array, base: Array) -> Array:
     return np.asarray((position - base[:3, 3]) @ base[:3, :3])
 
 
-def of(samples: Samples | None, test: str, place: str, cycle: int = 1) -> NDArray[np.bool_]:
+def poses_of(campaign: SimulatedCampaign) -> AttainedPoses:
+    assert campaign.poses is not None
+    return campaign.poses
+
+
+def stream(found: tuple[SimulatedCampaign, Array], test: str, place: str) -> tuple[Array, Array, Array | None]:
+    """Return time, position and orientation of the first cycle in the base frame."""
+    campaign, base = found
+    samples = campaign.settling if test in ("t", "posing-time") else campaign.paths
     assert samples is not None
-    return np.asarray(samples.criterion.are(test) & samples.place.are(place) & (samples.cycle == cycle))
+    here = samples.criterion.are(test) & samples.place.are(place) & (samples.cycle == 1)
+    turned = None if samples.rotation is None else base[:3, :3].T @ samples.rotation[here]
+    return samples.time[here], in_base(samples.position[here], base), turned
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +71,7 @@ def ideal() -> tuple[SimulatedCampaign, Array]:
 
 
 def test_poses_are_read_as_often_as_planned(whole: SimulatedCampaign) -> None:
-    poses = whole.poses
-    assert poses is not None
+    poses = poses_of(whole)
     assert set(poses.robot.rows(poses.criterion.are("E")).names) >= {"r1", "r2", "r3", "r4", "r5"}
     counts = {name: int(poses.criterion.are(name).sum()) for name in ("AP", "vAP", "AD", "E", "dAP")}
     groups = 3  # at once, after half an hour and after an hour
@@ -79,12 +87,8 @@ def test_streams_have_their_places_cycles_and_rising_times(whole: SimulatedCampa
     assert paths is not None
     assert settling is not None
     assert set(paths.criterion.names) == {"AT", "AT-reorientation", "CR", "AV", "WS"}
-    assert {paths.place.names[k] for k in paths.place.code[paths.criterion.are("AT")]} == {
-        "line",
-        "rectangle",
-        "large-circle",
-        "small-circle",
-    }
+    places = {paths.place.names[k] for k in paths.place.code[paths.criterion.are("AT")]}
+    assert places == {"line", "rectangle", "large-circle", "small-circle"}
     assert set(settling.place.names) == {"P1", "D10", "D50"}
     for samples in (paths, settling):
         assert (np.diff(samples.time) > 0).all()
@@ -104,26 +108,19 @@ def test_pushes_are_in_both_senses_of_each_axis_in_tenths_of_the_load(whole: Sim
 def test_the_same_seed_gives_the_same_readings_and_another_one_others() -> None:
     plan = small_plan(["AP", "AV"], cycles=CYCLES)
     tracker = Tracker(1e-5, 1e-4, 100.0)
-    first, again, other = (run(plan, "tracker-triangular", tracker, DRIVES, seed)[0] for seed in (1, 1, 2))
-    assert first.poses is not None
-    assert again.poses is not None
-    assert other.poses is not None
-    assert np.array_equal(first.poses.position, again.poses.position)
-    assert not np.array_equal(first.poses.position, other.poses.position)
-    assert first.paths is not None
-    assert again.paths is not None
-    assert np.array_equal(first.paths.time, again.paths.time)
+    first, again, other = (run(plan, "tracker-triangular", tracker, DRIVES, seed) for seed in (1, 1, 2))
+    assert np.array_equal(poses_of(first[0]).position, poses_of(again[0]).position)
+    assert not np.array_equal(poses_of(first[0]).position, poses_of(other[0]).position)
+    assert np.array_equal(stream(first, "AV", "line")[0], stream(again, "AV", "line")[0])
 
 
 def test_a_perfect_robot_attains_its_commands(ideal: tuple[SimulatedCampaign, Array]) -> None:
     (campaign, base), plan = ideal, small_plan(["AP"])
-    poses = campaign.poses
-    assert poses is not None
+    poses = poses_of(campaign)
     assert poses.rotation is not None
     for name in ("P1", "P2", "P3", "P4", "P5"):
-        pose = plan.poses[name]
         rows = poses.pose.are(name)
-        np.testing.assert_allclose(in_base(poses.position[rows], base), [pose.position] * 3, atol=1e-8)
+        np.testing.assert_allclose(in_base(poses.position[rows], base), [plan.poses[name].position] * 3, atol=1e-8)
         np.testing.assert_allclose(base[:3, :3].T @ poses.rotation[rows], [DOWN] * int(rows.sum()), atol=1e-8)
 
 
@@ -131,17 +128,14 @@ def test_joints_that_come_to_rest_elsewhere_scatter_the_tip_by_the_jacobian() ->
     plan = small_plan(["AP"], cycles={"AP": 400})
     plan = replace(plan, tests=(replace(plan.tests[0], places=("P1",)),))
     campaign, base = run(plan, drives=replace(IDEAL, scatter=1e-5))
-    assert campaign.poses is not None
     J = plan.robot.jacobian(plan.poses["P1"].joints[None])[0, :3]
     expected = 1e-10 * J @ J.T
-    np.testing.assert_allclose(np.cov(in_base(campaign.poses.position, base).T), expected, atol=0.2 * expected.max())
+    found = np.cov(in_base(poses_of(campaign).position, base).T)
+    np.testing.assert_allclose(found, expected, atol=0.2 * expected.max())
 
 
 def test_the_middle_of_a_line_is_run_at_the_commanded_velocity(ideal: tuple[SimulatedCampaign, Array]) -> None:
-    campaign, _ = ideal
-    rows = of(campaign.paths, "AV", "line")
-    assert campaign.paths is not None
-    position, time = campaign.paths.position[rows], campaign.paths.time[rows]
+    time, position, _ = stream(ideal, "AV", "line")
     speed = np.linalg.norm(np.diff(position, axis=0), axis=1) / np.diff(time)
     assert speed.max() == pytest.approx(0.5, rel=1e-4)
     assert np.median(speed[speed > 0.4]) == pytest.approx(0.5, rel=1e-6)
@@ -150,35 +144,28 @@ def test_the_middle_of_a_line_is_run_at_the_commanded_velocity(ideal: tuple[Simu
 def test_a_rectangle_stops_at_its_corners_where_accuracy_is_tested_and_cuts_them_where_corners_are(
     ideal: tuple[SimulatedCampaign, Array],
 ) -> None:
-    campaign, base = ideal
     corners = small_plan(["CR"]).paths["rectangle"].points[1:4]
-    assert campaign.paths is not None
-    for test, least, most in (("AT", 0.0, 0.1e-3), ("CR", 0.9, 1.3)):
-        position = in_base(campaign.paths.position[of(campaign.paths, test, "rectangle")], base)
+    cut = ZONE * math.sqrt(2) / 4
+    for test, least, most in (("AT", 0.0, 0.1e-3), ("CR", 0.9 * cut, 1.3 * cut)):
+        _, position, _ = stream(ideal, test, "rectangle")
         nearest = np.linalg.norm(position[:, None] - corners, axis=2).min(axis=0)
-        scale = 1.0 if test == "AT" else ZONE * math.sqrt(2) / 4
-        assert (nearest >= least * scale).all()
-        assert (nearest <= most * scale).all()
+        assert (nearest >= least).all()
+        assert (nearest <= most).all()
 
 
 def test_circles_keep_their_radius_and_close(ideal: tuple[SimulatedCampaign, Array]) -> None:
-    campaign, base = ideal
-    assert campaign.paths is not None
     for name in ("large-circle", "small-circle"):
-        path = small_plan(["AT"]).paths[name]
-        position = in_base(campaign.paths.position[of(campaign.paths, "AT", name)], base) - path.points[0]
-        radius = np.linalg.norm(path.points[1] - path.points[0])
-        np.testing.assert_allclose(np.linalg.norm(position, axis=1), radius, atol=5e-6)
-        np.testing.assert_allclose(position[[0, -1]] + path.points[0], path.points[[1, 1]], atol=1e-6)
+        centre, first = small_plan(["AT"]).paths[name].points
+        _, position, _ = stream(ideal, "AT", name)
+        away = np.linalg.norm(position - centre, axis=1)
+        np.testing.assert_allclose(away, np.linalg.norm(first - centre), atol=5e-6)
+        np.testing.assert_allclose(position[[0, -1]], [first, first], atol=1e-6)
 
 
 def test_the_orientation_alternates_on_the_way(ideal: tuple[SimulatedCampaign, Array]) -> None:
-    campaign, base = ideal
-    assert campaign.paths is not None
-    assert campaign.paths.rotation is not None
-    rows = of(campaign.paths, "AT-reorientation", "line")
-    turned = rotation_vector(base[:3, :3].T @ campaign.paths.rotation[rows] @ DOWN.T)
-    angle = np.degrees(turned[:, 0])
+    _, _, rotation = stream(ideal, "AT-reorientation", "line")
+    assert rotation is not None
+    angle = np.degrees(rotation_vector(rotation @ DOWN.T)[:, 0])
     peaks = (angle[1:-1] > angle[:-2]) & (angle[1:-1] >= angle[2:]) & (angle[1:-1] > 5.0)
     assert int(peaks.sum()) == TURNS // 2
     assert angle.max() == pytest.approx(10.0, abs=0.6)
@@ -187,13 +174,10 @@ def test_the_orientation_alternates_on_the_way(ideal: tuple[SimulatedCampaign, A
 
 def test_a_weave_goes_from_side_to_side_as_planned() -> None:
     plan = small_plan(["WS"], cycles={"WS": 1}, rated_velocity=0.01)
-    campaign, base = run(plan)
     path = plan.paths["weave"]
-    assert campaign.paths is not None
-    rows = of(campaign.paths, "WS", "weave")
-    position, time = in_base(campaign.paths.position[rows], base) - path.points[0], campaign.paths.time[rows]
+    time, position, _ = stream(run(plan), "WS", "weave")
     along = (path.points[1] - path.points[0]) / np.linalg.norm(path.points[1] - path.points[0])
-    aside = position @ np.cross(path.normal, along)
+    aside = (position - path.points[0]) @ np.cross(path.normal, along)
     # Corners are blended: each is cut by a quarter of the zone times the change of direction.
     cut = 0.05 * path.stroke * 2 * math.sin(math.atan2(path.stroke, path.wavelength / 2)) / 4
     assert np.ptp(aside) == pytest.approx(path.stroke - 2 * cut, rel=1e-3)
@@ -203,54 +187,42 @@ def test_a_weave_goes_from_side_to_side_as_planned() -> None:
 
 def test_a_weak_servo_overshoots_and_the_tip_comes_to_rest_at_its_pose() -> None:
     plan = small_plan(["t", "posing-time"], cycles={"t": 1, "posing-time": 1})
-    drives = replace(IDEAL, servo=Servo(60.0, 0.3, feedforward=1.0))
-    campaign, base = run(plan, drives=drives)
-    settling = campaign.settling
-    assert settling is not None
-    at_rest = in_base(settling.position[of(settling, "t", "P1")], base)
-    away = np.linalg.norm(at_rest - plan.poses["P1"].position, axis=1)
+    found = run(plan, drives=replace(IDEAL, servo=Servo(60.0, 0.3, feedforward=1.0)))
+    away = np.linalg.norm(stream(found, "t", "P1")[1] - plan.poses["P1"].position, axis=1)
     assert away[-1] < 1e-6
-    inside = int(np.argmax(away < plan.limit_band))
-    assert away[inside:].max() > plan.limit_band
-    begun = in_base(settling.position[of(settling, "posing-time", "D50")], base)
+    assert away[int(np.argmax(away < plan.limit_band)) :].max() > plan.limit_band
+    _, begun, _ = stream(found, "posing-time", "D50")
     np.testing.assert_allclose(begun[0], plan.poses["P1"].position, atol=1e-8)
     np.testing.assert_allclose(begun[-1], plan.poses["D50"].position, atol=1e-6)
 
 
-def test_the_arm_drifts_while_it_warms_up() -> None:
+def test_the_arm_drifts_while_it_warms_up_and_a_heavier_load_lowers_the_tip() -> None:
     plan = small_plan(["dAP"], cycles={"dAP": 1}, hours=8.0)
-    campaign, _ = run(plan, drives=replace(DRIVES, scatter=0.0))
-    assert campaign.poses is not None
-    moved = np.linalg.norm(campaign.poses.position - campaign.poses.position[0], axis=1)
+    place = poses_of(run(plan, drives=replace(DRIVES, scatter=0.0))[0]).position
+    moved = np.linalg.norm(place - place[0], axis=1)
     assert (np.diff(moved) > -1e-7).all()
     assert 2e-5 < moved[-1] < 2e-4
-
-
-def test_a_heavier_load_lowers_the_tip() -> None:
-    plan = small_plan(["AP"], cycles={"AP": 1}, loads=(0.1, 1.0))
-    campaign, _ = run(plan, "tracker-triangular")
-    poses = campaign.poses
-    assert poses is not None
-    heights = [poses.position[poses.pose.are("P1") & (poses.load == load), 2] for load in (0.1, 1.0)]
-    lower = float(heights[0][0] - heights[1][0])
-    assert 0.2e-3 < lower < 0.6e-3
+    poses = poses_of(run(small_plan(["AP"], cycles={"AP": 1}, loads=(0.1, 1.0)), "tracker-triangular")[0])
+    light, heavy = (float(poses.position[poses.pose.are("P1") & (poses.load == load), 2][0]) for load in (0.1, 1.0))
+    assert 0.2e-3 < light - heavy < 0.6e-3
 
 
 def test_plans_that_cannot_be_run_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    plan = small_plan(["AP"], cycles={"AP": 1})
-    with pytest.raises(InputError, match="the plan has no such pose; got 'P9'"):
-        run(replace(plan, tests=(replace(plan.tests[0], places=("P9", "P1")),)))
+    plan, lines = small_plan(["AP"], cycles={"AP": 1}), small_plan(["AT-reorientation"])
+    line = lines.paths["line"]
     alone = replace(plan, poses={"P1": plan.poses["P1"]}, tests=(replace(plan.tests[0], places=("P1",)),))
-    with pytest.raises(InputError, match="one pose alone"):
-        run(alone)
-    lines = small_plan(["AT-reorientation"])
-    with pytest.raises(InputError, match="the plan has no such path; got 'line'"):
-        run(replace(lines, paths={}))
-    with pytest.raises(InputError, match="this path has one orientation"):
-        run(replace(lines, paths={"line": replace(lines.paths["line"], other=None)}))
-    far = replace(lines.paths["line"], points=lines.paths["line"].points + 2.0)
-    with pytest.raises(InputError, match="the robot cannot come to a commanded pose"):
-        run(replace(lines, paths={"line": far}))
+    for wrong, said in (
+        (replace(plan, tests=(replace(plan.tests[0], places=("P9", "P1")),)), "the plan has no such pose; got 'P9'"),
+        (alone, "one pose alone"),
+        (replace(lines, paths={}), "the plan has no such path; got 'line'"),
+        (replace(lines, paths={"line": replace(line, other=None)}), "this path has one orientation"),
+        (
+            replace(lines, paths={"line": replace(line, points=line.points + 2.0)}),
+            "the robot cannot come to a commanded pose",
+        ),
+    ):
+        with pytest.raises(InputError, match=said):
+            run(wrong)
     monkeypatch.setenv("TRUEARM_LIMITS", "samples_read=100")
     with pytest.raises(InputError, match="too many samples"):
         run(lines)

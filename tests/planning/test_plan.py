@@ -29,9 +29,7 @@ def test_a_plan_in_json_and_in_its_files(truearm: Truearm, tmp_path: Path) -> No
     rules, out = tmp_path / "rules.yaml", tmp_path / "plan.csv"
     rules.write_text(RULES)
     words = ("plan", "irb120", "--poses", 15, "--candidates", 400, "--constraints", rules, "--out", out, "--json")
-    run = truearm(*words)
-    assert run.code == 0
-    told = json.loads(run.out)
+    told = json.loads(truearm(*words).out)
     assert {"poses", "indices", "candidates", "rejected", "seconds"} <= set(told)
     assert (told["poses"], told["candidates"]) == (15, 400)
     assert list(told["indices"]) == ["O1", "O2", "O3", "O4", "O5"]
@@ -39,14 +37,31 @@ def test_a_plan_in_json_and_in_its_files(truearm: Truearm, tmp_path: Path) -> No
     assert told["prediction"]["floor_mm"] < told["prediction"]["planned_mm"]
     rows = rows_of(out)
     assert [row["configuration"] for row in rows] == [str(k + 1) for k in range(15)]
-    assert list(rows[0])[1] == "joint_1 [deg]"
-    assert list(rows[0])[-1] == "approach_6 [deg]"
+    assert (list(rows[0])[1], list(rows[0])[-1]) == ("joint_1 [deg]", "approach_6 [deg]")
     page = (tmp_path / "plan.html").read_text()
     assert "Where the robot will be accurate" in page
     assert "<script src" not in page
     first = out.read_bytes()
     assert truearm(*words).code == 0
     assert out.read_bytes() == first
+
+
+def test_inputs_are_not_overwritten_and_refusals_write_nothing(truearm: Truearm, small: Path, tmp_path: Path) -> None:
+    data, out = tmp_path / "plan.csv", tmp_path / "other.csv"
+    data.write_bytes((small / "data.csv").read_bytes())
+    for words, message in (
+        (("--from", data, "--poses", 12, "--out", data), "would be overwritten"),
+        (("--from", data, "--poses", 10, "--program", "rapid", "--out", tmp_path), "would be overwritten"),
+        (("--poses", "many", "--out", out), "a number of poses belongs here"),
+        (("--poses", 8, "--floor", -100, "--no-floor", "--out", out), "--floor, --no-floor: a floor is given and"),
+        (("--poses", 8, "--speed", "250", "--out", out), "--speed: this is said of a measuring program"),
+        (("--poses", 8, "--dwell", "2", "--out", out), "State --program, or leave it out"),
+        (("--poses", 8, "--program", "krl", "--out", out.with_suffix("")), "Take --program rapid"),
+    ):
+        run = truearm("plan", "irb120", *words)
+        assert (run.code, message in run.err) == (2, True), words
+        assert [path.name for path in tmp_path.iterdir()] == ["plan.csv"], words
+    assert data.read_bytes() == (small / "data.csv").read_bytes()
 
 
 def test_a_choice_among_measured_configurations_keeps_their_names(
@@ -77,48 +92,6 @@ def test_auto_and_a_calibrated_robot(truearm: Truearm, small: Path, tmp_path: Pa
     assert "the position of the instrument is not known" in run.err
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--poses", "many"), "a number of poses belongs here"),
-        (("--poses", "0"), "--poses: the number is out of range; got 0; allowed: 1 to 50000"),
-        (("--poses", "20", "--model", "auto"), "no model of this name"),
-        (("--poses", "20", "--objective", "O9"), "no objective of this name"),
-        (("--poses", "auto", "--objective", "O2"), "only O1 can choose"),
-        (("--poses", "20", "--candidates", "19"), "too few configurations"),
-    ],
-)
-def test_refusals_write_nothing(truearm: Truearm, tmp_path: Path, words: tuple[str, ...], message: str) -> None:
-    run = truearm("plan", "irb120", "--out", tmp_path / "plan.csv", *words)
-    assert run.code == 2
-    assert message in run.err
-    assert not list(tmp_path.iterdir())
-
-
-def test_constraints_that_leave_too_few_say_what_they_cost(truearm: Truearm, tmp_path: Path) -> None:
-    rules = tmp_path / "rules.yaml"
-    rules.write_text(RULES.replace("50", "900"))
-    run = truearm("plan", "irb120", "--poses", 30, "--constraints", rules, "--out", tmp_path / "plan.csv")
-    assert run.code == 2
-    assert "rejected by moment_2" in run.err
-    assert "floor" in run.err
-    rules.write_text(RULES + "wall: 3\n")
-    run = truearm("plan", "irb120", "--poses", 30, "--constraints", rules, "--out", tmp_path / "plan.csv")
-    assert run.code == 2
-    assert "wall" in run.err
-
-
-def test_inputs_are_not_overwritten(truearm: Truearm, small: Path, tmp_path: Path) -> None:
-    data = tmp_path / "data.csv"
-    data.write_bytes((small / "data.csv").read_bytes())
-    run = truearm("plan", "irb120", "--from", data, "--poses", 12, "--out", data)
-    assert run.code == 2
-    assert "would be overwritten" in run.err
-    run = truearm("plan", "irb120", "--poses", 12, "--out", tmp_path / "plan.html")
-    assert run.code == 2
-    assert "the plan is a CSV file" in run.err
-
-
 def test_floor_room_and_home_of_the_command_line(truearm: Truearm, tmp_path: Path) -> None:
     out = tmp_path / "plan.csv"
     words = ("plan", "irb120", "--poses", 8, "--candidates", 40, "--out", out)
@@ -137,21 +110,25 @@ def test_floor_room_and_home_of_the_command_line(truearm: Truearm, tmp_path: Pat
     assert f"Written: {out}, {out.with_suffix('.html')}, {tmp_path / 'plan-ways.csv'}" in run.out
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--floor", "100"), "--floor: the floor is above the base of the robot; got '100 mm'"),
-        (("--floor", "-100", "--no-floor"), "--floor, --no-floor: a floor is given and denied"),
-        (("--clearance", "-5"), "--clearance"),
-        (("--home", "0,0,0"), "--home: there are not as many numbers as joints"),
-        (("--home", "0,100,0,0,0,0"), "--home: the safe configuration is not clear"),
-        (("--home", "0,0,0,0,0,300"), "--home: joint 6 of the safe configuration is not where the plan keeps it"),
-    ],
-)
-def test_what_cannot_be_driven_is_refused(
-    truearm: Truearm, tmp_path: Path, words: tuple[str, ...], message: str
-) -> None:
-    run = truearm("plan", "irb120", "--poses", 8, "--candidates", 40, "--out", tmp_path / "plan.csv", *words)
-    assert run.code == 2
-    assert message in run.err
-    assert not list(tmp_path.iterdir())
+def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    driven = ("--program", "rapid", "--speed", "100,5", "--dwell", "1.5", "--wait", "input 3,60s")
+    words = ("plan", "irb120", "--poses", 10, "--candidates", 60, "--clearance", 20, *driven, "--out", out)
+    run = truearm(*words, "--details")
+    assert (run.code, run.err) == (0, "")
+    assert "At most 100 mm/s and 5 % of the joints' speed (250, 250, 250, 320, 320, 420 deg/s); it stands" in run.out
+    assert "it stands for 1.5 s, then for input 3 up to 60 s." in run.out
+    assert f"Written to {out}: plan.csv, plan.html, plan-ways.csv, sheet.html, MEASURE.mod" in run.out
+    assert "state --payload. State the targets" in run.out
+    text = (out / "MEASURE.mod").read_text()
+    assert "[100," in text
+    assert "WaitTime \\InPos,1.5;" in text
+    assert "WaitDI di3,1\\MaxTime:=60\\TimeFlag:=late;" in text
+    assert "Approach" not in text
+    first = {path.name: path.read_bytes() for path in out.iterdir()}
+    told = json.loads(truearm(*words, "--json").out)["program"]
+    assert (told["speed_mm_s"], told["joint_speed_percent"], told["dwell_s"]) == (pytest.approx(100.0), 5.0, 1.5)
+    again = {path.name: path.read_bytes() for path in out.iterdir()}
+    assert again["MEASURE.mod"] == first["MEASURE.mod"]
+    assert again["plan.csv"] == first["plan.csv"]
+    assert b"--out PLAN" in again["sheet.html"]

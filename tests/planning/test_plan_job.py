@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from tests.simulated import campaign
 
 import truearm
 from truearm.engine.base.errors import InputError
-from truearm.engine.base.manifest import MANIFEST
+from truearm.engine.base.manifest import MANIFEST, sets_in
+from truearm.engine.base.writing import write_files
+from truearm.engine.command.driving import plan_files_for, refuse_ways_of_another, replaced_notices
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.motion.constraints import Constraints
 
@@ -74,36 +77,33 @@ def test_limits_in_another_unit_are_warned_of(tmp_path: Path) -> None:
     assert replace(drawn, lost={"floor": 2, "links": 0, "keep_out a": 30}).words == "keep_out a 30, floor 2"
 
 
-def test_a_device_and_given_candidates_do_not_go_together() -> None:
+def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "made.html").mkdir()
+    poses = tmp_path / "poses.csv"
+    poses.write_text(POSES)
     _, data = campaign("irb120", 12, 0.05e-3, 1)
-    with pytest.raises(InputError, match="a device finds its own configurations") as refusal:
-        truearm.plan("irb120", poses=10, candidates_from=data, device="ballbar")
-    assert refusal.value.parameter == "device, candidates_from"
+    cases: list[tuple[dict[str, Any], str, str]] = [
+        ({"poses": 12.0}, "poses", "whole number|number of poses"),
+        ({"poses": "many"}, "poses", "a number of poses belongs here; got 'many'"),
+        ({"dwell": 2.0}, "dwell", "none is asked for"),
+        ({"candidates_from": data, "device": "ballbar"}, "device, candidates_from", "a device finds its own"),
+        ({"out": tmp_path / "plan.html"}, "out", "the plan is a CSV file"),
+        ({"out": tmp_path / "made.csv"}, "out", "this is a folder"),
+        ({"accurate_at": poses, "out": poses}, "out", "this file is read, and would be overwritten"),
+    ]
+    for given, parameter, words in cases:
+        with pytest.raises(InputError, match=words) as refusal:
+            truearm.plan("irb120", **{"poses": 10, "candidates": 60, **given})
+        assert refusal.value.parameter == parameter
+    assert poses.read_text() == POSES
 
 
-def test_nothing_is_overwritten_and_the_page_has_room(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the plan is a CSV file") as refusal:
-        truearm.plan("irb120", poses=10, out=tmp_path / "plan.html")
-    assert refusal.value.parameter == "out"
-    (tmp_path / "plan.html").mkdir()
-    with pytest.raises(InputError, match="this is a folder") as refusal:
-        truearm.plan("irb120", poses=10, out=tmp_path / "plan.csv")
-    assert refusal.value.parameter == "out"
-
-
-@pytest.mark.parametrize("poses", ["many", 0, 12.0, True])
-def test_poses_are_a_whole_number_or_auto(poses: object) -> None:
-    with pytest.raises(InputError) as refusal:
-        truearm.plan("irb120", poses=poses)  # type: ignore[arg-type]
-    assert refusal.value.parameter == "poses"
-
-
-@pytest.mark.parametrize(("noise", "said"), [(1e-4, "off by 0.100 mm"), (3e-5, "off by 0.0300 mm")])
-def test_a_plan_says_what_noise_it_assumes(noise: float, said: str) -> None:
-    planned = truearm.plan("irb120", poses=8, candidates=30, noise=noise, seed=3)
-    assert said in planned.answer[-1]
-    assert "give `noise` where you know better" in planned.answer[-1]
-    assert planned.answer[-1] in planned.lines()
+def test_a_plan_says_what_noise_it_assumes() -> None:
+    for noise, said in ((1e-4, "off by 0.100 mm"), (3e-5, "off by 0.0300 mm")):
+        planned = truearm.plan("irb120", poses=8, candidates=30, noise=noise, seed=3)
+        assert said in planned.answer[-1]
+        assert "give `noise` where you know better" in planned.answer[-1]
+        assert planned.answer[-1] in planned.lines()
 
 
 POSES = """pose,x [mm],y [mm],z [mm],qw,qx,qy,qz
@@ -181,9 +181,96 @@ def test_poses_and_targets_out_of_reach_are_refused(tmp_path: Path) -> None:
         truearm.plan("irb120", poses=12, candidates=60, accurate_at=program)
 
 
-def test_a_plan_keeps_the_poses_it_was_made_for(tmp_path: Path) -> None:
-    poses = tmp_path / "poses.csv"
-    poses.write_text(POSES)
-    with pytest.raises(InputError, match="this file is read, and would be overwritten"):
-        truearm.plan("irb120", poses=12, candidates=60, accurate_at=poses, out=poses)
-    assert poses.read_text() == POSES
+QUICK: dict[str, Any] = {"poses": 10, "candidates": 60, "clearance": 0.0, "no_floor": True}
+PLAN_FILES = ("plan.csv", "plan.html", "plan-ways.csv")
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Path:
+    """Return the table of a plan that truearm wrote."""
+    write_files(tmp_path, dict.fromkeys(PLAN_FILES, "a,b\n"), "truearm plan irb120")
+    return tmp_path / "plan.csv"
+
+
+def test_another_plan_is_replaced_and_that_is_told(tmp_path: Path) -> None:
+    table = tmp_path / "plan.csv"
+    first = truearm.plan("irb120", **QUICK, command="truearm plan first", out=table)
+    again = truearm.plan("irb120", **QUICK, command="truearm plan again", out=table)
+    assert not first.replaced
+    assert not again.replaced
+    other = truearm.plan("irb120", **QUICK, seed=1, out=table)
+    (notice,) = other.replaced
+    assert (notice.code, notice.level) == ("plan-replaced", "warning")
+    assert f"Another plan stood in {table}, written by 'truearm plan again', and was replaced." in notice.message
+    assert any("plan-replaced" in line for line in other.lines())
+    assert [one["code"] for one in other.summary()["warnings"]] == ["plan-replaced", "tool-assumed"]
+    table.write_text(table.read_text() + "11,0,0,0,0,0,0\n")
+    before = table.read_bytes()
+    with pytest.raises(InputError, match="written here by truearm and has been changed since") as refusal:
+        truearm.plan("irb120", **QUICK, out=table)
+    assert refusal.value.parameter == "out"
+    with pytest.raises(InputError, match="changed since") as refusal:
+        other.save(table)
+    assert (refusal.value.parameter, table.read_bytes()) == ("file", before)
+
+
+@pytest.mark.parametrize("name", PLAN_FILES)
+def test_a_file_that_was_changed_or_is_foreign_stays(name: str, written: Path) -> None:
+    plan_files_for(PLAN_FILES, written)
+    written.with_name(name).write_text("mended by hand\n")
+    with pytest.raises(InputError, match=r"has been changed since.*Choose another `out`") as refusal:
+        plan_files_for(PLAN_FILES, written)
+    assert refusal.value.where == str(written.with_name(name))
+    elsewhere = written.parent / "new" / "plan.csv"
+    elsewhere.parent.mkdir()
+    elsewhere.with_name(name).write_text("mine\n")
+    with pytest.raises(InputError, match="not written here by truearm"):
+        plan_files_for(PLAN_FILES, elsewhere)
+
+
+def test_the_files_of_another_result_stay(written: Path) -> None:
+    write_files(written.parent, {"plan.csv": "1", "plan.html": "2", "plan-poses.csv": "3"}, "truearm poses irb120")
+    with pytest.raises(InputError, match=r"to another result there; got .written together with plan-poses\.csv"):
+        plan_files_for(PLAN_FILES, written)
+
+
+def test_no_ways_stay_beside_a_plan_that_has_none(written: Path) -> None:
+    with pytest.raises(InputError, match="the ways of another plan are there") as refusal:
+        refuse_ways_of_another(written.with_name(PLAN_FILES[2]))
+    assert refusal.value.parameter == "out"
+    refuse_ways_of_another(written.with_name("other-ways.csv"))
+
+
+def test_what_was_removed_or_is_the_same_is_not_told_of(written: Path) -> None:
+    assert not replaced_notices(written.parent, "plan.csv", "a,b\n")
+    assert replaced_notices(written.parent, "plan.csv", "c,d\n")
+    written.unlink()
+    assert not replaced_notices(written.parent, "plan.csv", "c,d\n")
+
+
+def test_plans_of_tests_and_of_inclinometers_and_sets_of_poses_keep_to_the_same(tmp_path: Path) -> None:
+    cube = tmp_path / "cube.yaml"
+    cube.write_text("truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n")
+    tests: dict[str, Any] = {"cube": cube, "criteria": ["ap"], "out": tmp_path / "iso"}
+    truearm.iso9283_plan("irb120", **tests)
+    assert "plan-replaced" not in {one.code for one in truearm.iso9283_plan("irb120", **tests).warnings}
+    other = truearm.iso9283_plan("irb120", **tests, limit_band=0.2e-3)
+    assert other.warnings[-1].code == "plan-replaced"
+    tilts: dict[str, Any] = {"poses": 8, "candidates": 60, "pull": 20.0}
+    truearm.plan_inclinometers("katana450", **tilts, out=tmp_path / "tilts.csv")
+    table = truearm.plan_inclinometers("katana450", **tilts, seed=1, out=tmp_path / "tilts.csv")
+    assert [one["code"] for one in table.summary()["warnings"]] == ["plan-replaced"]
+    poses: dict[str, Any] = {"set": "iso-cube", "centre": (0.35, 0, 0.35), "side": 0.2}
+    truearm.poses("irb120", **poses, out=tmp_path / "set.csv")
+    truearm.poses("irb120", **poses, out=tmp_path / "set.csv")
+    for name, job in (
+        ("iso/sheet.html", lambda: truearm.iso9283_plan("irb120", **tests)),
+        ("tilts.csv", lambda: truearm.plan_inclinometers("katana450", **tilts, out=tmp_path / "tilts.csv")),
+        ("set.csv", lambda: truearm.poses("irb120", **poses, out=tmp_path / "set.csv")),
+    ):
+        (tmp_path / name).write_text("filled in\n")
+        with pytest.raises(InputError, match="has been changed since") as refusal:
+            job()
+        assert refusal.value.parameter == "out"
+        assert (tmp_path / name).read_text() == "filled in\n"
+    assert sets_in(tmp_path)

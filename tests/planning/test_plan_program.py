@@ -14,15 +14,8 @@ from tests.plan_tours import a_tour
 
 import truearm
 from truearm.engine.motion.tour import Tour
-from truearm.engine.programs import BY_NAME
-from truearm.engine.programs.joint_speeds import (
-    fastest_point,
-    first_shares,
-    joint_rates,
-    known_speeds,
-    speed_notices,
-    speed_words,
-)
+from truearm.engine.programs import BY_NAME, joint_speeds
+from truearm.engine.programs.joint_speeds import fastest_point, first_shares, joint_rates, known_speeds, speed_notices
 from truearm.engine.programs.new_program import LONGEST_COMMENT, JointMove, MotionProgram, Wait, percent
 from truearm.engine.programs.program import Program, Source
 from truearm.engine.programs.urscript.new import FASTEST
@@ -35,14 +28,8 @@ from truearm.engine.twin.truths import truth_twin
 from truearm.iso9283.simulating.moving_arm import DRIVES, MovingArm, joint_move, last_moves
 from truearm.planning.plan_program import LONGEST_LABEL, Driving, plan_program, shown_speed
 
-ROBOTS = {
-    "rapid": "irb1600",
-    "krl": "kr5",
-    "fanuc-ls": "lrmate200ic",
-    "urscript": "ur5e",
-    "inform": "gp7",
-    "val3": "tx2_60",
-}
+ROBOTS = {"rapid": "irb1600", "krl": "kr5", "fanuc-ls": "lrmate200ic"}
+ROBOTS |= {"urscript": "ur5e", "inform": "gp7", "val3": "tx2_60"}
 WAITS = ("time", "input", "operator")
 
 
@@ -90,52 +77,29 @@ def visited(found: Program) -> list[str]:
     return called
 
 
-@pytest.mark.parametrize("wait", WAITS)
 @pytest.mark.parametrize("name", BY_NAME)
-def test_the_own_reader_finds_the_planned_joint_positions_under_their_labels(name: str, wait: str) -> None:
-    robot, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
-    found = read_again(name, program)
-    assert found.skipped == ()
-    assert not found.unknown
-    assert {move.kind for move in found.moves} == {"joint"}
+def test_the_own_reader_finds_the_planned_joint_positions_under_their_labels(name: str) -> None:
     digit = 0.5e-6 if name == "urscript" else np.radians(0.5e-4)
-    went = robot.controller.to_model(commanded(found, len(robot.joints)))
-    shown = robot.controller.from_model(tour.joints)
-    assert np.abs(commanded(found, len(robot.joints)) - shown).max() <= digit * (1 + 1e-9)
-    assert np.abs(went - tour.joints).max() <= 2.1 * digit  # one joint may count another
     expected = {"home": "Home", "via": "On the way", "approach": "Approach"}
-    assert visited(found) == [expected.get(stop.kind, f"Measure {stop.label}") for stop in tour.stops]
+    for wait in WAITS:
+        robot, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
+        found = read_again(name, program)
+        assert found.skipped == ()
+        assert not found.unknown
+        assert {move.kind for move in found.moves} == {"joint"}
+        at = commanded(found, len(robot.joints))
+        assert np.abs(at - robot.controller.from_model(tour.joints)).max() <= digit * (1 + 1e-9), wait
+        assert np.abs(robot.controller.to_model(at) - tour.joints).max() <= 2.1 * digit, wait  # one may count another
+        assert visited(found) == [expected.get(stop.kind, f"Measure {stop.label}") for stop in tour.stops], wait
 
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_no_output_is_set_and_no_mode_changed(name: str) -> None:
+    outputs = r"\bSetDO\b|\bSet\s|\bReset\s|\bPulse|\$OUT|\bDO\[|\bRO\[|\bDOUT\b|_out|dioSet"
+    modes = r"ConfL|CirPathMode|VelSet|AccSet|\$OV_PRO|OVERRIDE|SPEED_SLIDER|setMonitorSpeed|workingMode"
     for wait in WAITS:
         text = text_of(name, made(name, Driving(wait=wait, input="3"))[2])  # type: ignore[arg-type]
-        for words in (
-            r"\bSetDO\b",
-            r"\bSet\s",
-            r"\bReset\s",
-            r"\bPulse",
-            r"\$OUT",
-            r"\bDO\[",
-            r"\bRO\[",
-            r"\bDOUT\b",
-            "_out",
-            "dioSet",
-        ):
-            assert not re.search(words, text), words
-        for words in (
-            "ConfL",
-            "CirPathMode",
-            "VelSet",
-            "AccSet",
-            "$OV_PRO",
-            "OVERRIDE",
-            "SPEED_SLIDER",
-            "setMonitorSpeed",
-            "workingMode",
-        ):
-            assert words not in text
+        assert re.findall(outputs, text) == re.findall(modes, text) == [], wait
 
 
 STOPS = {
@@ -252,22 +216,13 @@ def test_comments_are_no_longer_than_controllers_take_them(name: str) -> None:
 def test_the_head_says_what_the_program_is(name: str) -> None:
     robot, _, program = made(name)
     text = text_of(name, program)
-    for words in (
-        f"Robot {robot.name}",
-        "Plan 0123456789ab",
-        "At most 250 mm/s and 10 %",
-        *(
-            {
-                "rapid": (),
-                "krl": ("of the joints' deg/s:", "154 154 228 343 384 721"),
-                "inform": ("375 315 410 550 550 1002",),
-            }.get(name, ())
-        ),
-        "Dwell 2 s, wait: input 3, 300 s",
-        "Not verified, no safety function",
-        "First run: step by step,",
-        "Go to Home by hand before it",
-    ):
+    own = {
+        "krl": ("of the joints' deg/s:", "154 154 228 343 384 721"),
+        "inform": ("375 315 410 550 550 1002",),
+    }.get(name, ())
+    head = ("Plan 0123456789ab", "At most 250 mm/s and 10 %", "Dwell 2 s, wait: input 3, 300 s")
+    warned = ("Not verified, no safety function", "First run: step by step,", "Go to Home by hand before it")
+    for words in (f"Robot {robot.name}", *head, *own, *warned):
         assert len(words) <= 32
         assert words in text
     assert text == text_of(name, made(name)[2])
@@ -332,13 +287,6 @@ def durations(name: str, text: str, shown: Array, rates: Array) -> list[float]:
     return [float((way / rates).max()) / share for way, share in zip(turned, shares[1:], strict=True)]
 
 
-@pytest.mark.parametrize("name", BY_NAME)
-@pytest.mark.parametrize("driving", [Driving(), Driving(speed=0.1, share=0.3), Driving(speed=2.0, share=0.05)])
-def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Driving) -> None:
-    for other in (False, True):
-        check_speeds(name, driving, other=other)
-
-
 @cache
 def driven(name: str, driving: Driving, *, other: bool) -> tuple[Robot, MotionProgram, float]:
     """Return an arm, the program of its tour and the highest speed that is told of it.
@@ -371,26 +319,28 @@ def with_speeds(robot: Robot, speeds: Sequence[float | None]) -> Robot:
     return replace(robot, joints=tuple(replace(joint, max_speed=speed) for joint, speed in pairs))
 
 
-def check_speeds(name: str, driving: Driving, *, other: bool) -> None:
-    robot, program, told = driven(name, driving, other=other)
+@pytest.mark.parametrize("name", BY_NAME)
+@pytest.mark.parametrize("driving", [Driving(), Driving(speed=0.1, share=0.3), Driving(speed=2.0, share=0.05)])
+def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Driving) -> None:
     tour = toured(name, approach=True)[1]
-    shown = robot.controller.from_model(tour.joints)
-    slow, fast = joint_rates(robot)
-    rates = np.full(len(slow), FASTEST) if name == "urscript" else fast
-    found = durations(name, text_of(name, program), shown, rates)
-    assert len(found) == len(tour.stops) - 1
-    fastest = float((fastest_ways(name) / found).max())
-    shares = [step.share for step in program.steps if isinstance(step, JointMove)]
-    assert max(shares) <= driving.share + 1e-12 or name == "urscript"
-    assert min(shares) > 0.0
-    assert f"At most {1e3 * told:.4g}"[:10] in text_of(name, program)
-    assert told == driving.speed or name in ("krl", "fanuc-ls")
-    assert fastest <= (1.0 + 1e-5) * told
-    assert fastest > 0.05 * driving.speed
-    joints = np.abs(np.diff(shown, axis=0)) / np.array(found)[:, None]
-    top = slow if name == "rapid" else rates if known_speeds(robot) is None else fast
-    least = 0.01 if name in ("krl", "fanuc-ls") else 0.0  # the finest share that the language says
-    assert (joints <= max(driving.share, least) * top * (1 + 1e-6)).all()
+    for other in (False, True):
+        robot, program, told = driven(name, driving, other=other)
+        shown = robot.controller.from_model(tour.joints)
+        slow, fast = joint_rates(robot)
+        rates = np.full(len(slow), FASTEST) if name == "urscript" else fast
+        found = durations(name, text_of(name, program), shown, rates)
+        assert len(found) == len(tour.stops) - 1
+        fastest = float((fastest_ways(name) / found).max())
+        shares = [step.share for step in program.steps if isinstance(step, JointMove)]
+        assert max(shares) <= driving.share + 1e-12 or name == "urscript"
+        assert min(shares) > 0.0
+        assert f"At most {1e3 * told:.4g}"[:10] in text_of(name, program)
+        assert told == driving.speed or name in ("krl", "fanuc-ls")
+        assert 0.05 * driving.speed < fastest <= (1.0 + 1e-5) * told, other
+        joints = np.abs(np.diff(shown, axis=0)) / np.array(found)[:, None]
+        top = slow if name == "rapid" else rates if known_speeds(robot) is None else fast
+        least = 0.01 if name in ("krl", "fanuc-ls") else 0.0  # the finest share that the language says
+        assert (joints <= max(driving.share, least) * top * (1 + 1e-6)).all(), other
 
 
 @pytest.mark.parametrize("name", ["ur10e", "li3", "scara"])
@@ -414,15 +364,8 @@ def test_the_highest_speed_on_a_way_is_bounded_and_hardly_more_than_it_is(name: 
 
 
 def test_shares_of_whole_percent_are_rounded_down() -> None:
-    assert [percent(share) for share in (0.0, 0.01, 0.0199, 0.019999999999, 0.055, 0.29, 1.0)] == [
-        1,
-        1,
-        1,
-        2,
-        5,
-        29,
-        100,
-    ]
+    shares = (0.0, 0.01, 0.0199, 0.019999999999, 0.055, 0.29, 1.0)
+    assert [percent(share) for share in shares] == [1, 1, 1, 2, 5, 29, 100]
 
 
 def test_a_first_move_that_may_be_faster_than_was_asked_is_counted() -> None:
@@ -508,7 +451,7 @@ def test_velocities_of_a_urdf_are_not_relied_on() -> None:
 def test_speeds_are_said_in_the_units_of_joints() -> None:
     robot = load_robot("irb120")
     slides = replace(robot, joints=(*robot.joints[:2], replace(robot.joints[2], kind="prismatic")))
-    assert speed_words([1.0, 2.0, 0.5], slides) == "57 deg/s, 115 deg/s, 500 mm/s"
+    assert joint_speeds.speed_words([1.0, 2.0, 0.5], slides) == "57 deg/s, 115 deg/s, 500 mm/s"
 
 
 def test_a_language_of_whole_percent_says_how_fast_that_is() -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,12 +18,17 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.motion.cell import Cell, boxes_of
 from truearm.engine.motion.collisions import CollisionCheck
 from truearm.engine.motion.constraints import Constraints
+from truearm.engine.motion.tour import Tour
 from truearm.engine.motion.touring import cell_notices
+from truearm.engine.motion.ways import WayFinder
+from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
+from truearm.engine.twin.truths import carrying_targets
+from truearm.planning.choosing import Reachable, chosen_with_ways
 from truearm.planning.result import Plan
 
-HEAD = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
+UNITS = {"units": {"length": "mm", "angle": "deg"}}
 TABLE = {"table": {"x": [300, 700], "y": [-300, 300], "z": [-1000, 150]}}
 
 
@@ -48,6 +53,17 @@ def window(robot: Robot) -> np.ndarray:
     return limits
 
 
+def rules(**entries: object) -> Constraints:
+    return Constraints.model_validate({"truearm": "truearm-constraints/1", **UNITS, **entries})
+
+
+def toured(**given: Any) -> tuple[Plan, Tour]:
+    """Plan for an IRB 120, and return its tour, too."""
+    planned = truearm.plan("irb120", **{"poses": 10, "candidates": 60, **given})
+    assert planned.tour is not None
+    return planned, planned.tour
+
+
 def a_quarter(robot: Robot) -> Constraints:
     """Limits of a quarter of what each joint has, in its middle."""
     size = [np.degrees(1.0) if joint.kind == "revolute" else 1e3 for joint in robot.joints]
@@ -55,7 +71,7 @@ def a_quarter(robot: Robot) -> Constraints:
         k: ((low + high) / 2 + (high - low) / 8 * np.array([-1.0, 1.0])) * by
         for k, ((low, high), by) in enumerate(zip(window(robot), size, strict=True), 1)
     }
-    return Constraints.model_validate({**HEAD, "limits": {k: tuple(v.tolist()) for k, v in limits.items()}})
+    return rules(limits={k: tuple(v.tolist()) for k, v in limits.items()})
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -75,98 +91,85 @@ def test_thirty_poses_are_driven(name: str) -> None:
     assert 0.05 <= tour.room <= sampled_room(robot, tour.joints, Cell()).min() + 1e-5
 
 
-def test_the_arms_are_of_ten_makers() -> None:
-    assert len({truearm.load_robot(name).maker for name in ARMS}) == 10
-
-
 @pytest.mark.parametrize("name", ["irb120", "ur5e", "fr3"])
 def test_limits_of_a_quarter_leave_as_many_to_choose_from(name: str) -> None:
     robot = truearm.load_robot(name)
-    rules = a_quarter(robot)
-    planned = truearm.plan(robot, poses=30, candidates=400, constraints=rules)
+    quarter = a_quarter(robot)
+    planned = truearm.plan(robot, poses=30, candidates=400, constraints=quarter)
     assert planned.made.usable == 400
     assert not any(planned.made.rejected.values())
     assert planned.tour is not None
-    for number, (low, high) in rules.limits.items():
+    for number, (low, high) in quarter.limits.items():
         there = np.rad2deg(planned.tour.joints[:, number - 1])
         assert ((there >= low - 1e-9) & (there <= high + 1e-9)).all()
 
 
 def test_boxes_of_the_cell_are_kept_out_of() -> None:
-    rules = Constraints.model_validate({**HEAD, "keep_out": TABLE})
-    free, kept = (truearm.plan("irb120", poses=20, candidates=150, constraints=one) for one in (None, rules))
-    box = TABLE["table"]
-    low, high = 1e-3 * np.array([box[axis] for axis in "xyz"]).T
+    free, kept = (
+        truearm.plan("irb120", poses=20, candidates=150, constraints=one) for one in (None, rules(keep_out=TABLE))
+    )
+    low, high = 1e-3 * np.array([TABLE["table"][axis] for axis in "xyz"]).T
     cell = Cell(boxes=boxes_of({"table": (low, high)}))
-    robot = kept.made.robot
-    assert sampled_room(robot, on_the_ways(free), cell, points=9).min() < 0.05
-    assert sampled_room(robot, on_the_ways(kept), cell, points=9).min() >= 0.05
+    assert sampled_room(free.made.robot, on_the_ways(free), cell, points=9).min() < 0.05
+    assert sampled_room(kept.made.robot, on_the_ways(kept), cell, points=9).min() >= 0.05
 
 
-def test_a_lower_floor_and_more_room() -> None:
-    low = truearm.plan("irb120", poses=20, candidates=150, floor=-0.4, clearance=0.1)
-    assert low.tour is not None
-    assert (low.tour.floor, low.tour.clearance) == (-0.4, 0.1)
+def test_the_floor_is_the_base_unless_one_is_given_or_there_is_none() -> None:
+    low, tour = toured(poses=20, candidates=150, floor=-0.4, clearance=0.1)
+    assert (tour.floor, tour.clearance) == (-0.4, 0.1)
     room = sampled_room(low.made.robot, on_the_ways(low), Cell(-0.4, clearance=0.1), points=9)
     assert room.min() >= 0.1
     assert low.made.robot.forward(low.joints)[0][:, 2].min() < 0.0
     assert " mm from the floor at -400 mm" in low.lines()[3]
-
-
-def test_a_file_with_a_floor_below_the_base_lowers_it() -> None:
-    rules = Constraints.model_validate({**HEAD, "floor": -300})
-    planned = truearm.plan("irb120", poses=12, candidates=60, constraints=rules)
-    assert planned.tour is not None
-    assert planned.tour.floor == pytest.approx(-0.3)
-    above = truearm.plan("irb120", poses=12, candidates=60, constraints=rules.model_copy(update={"floor": 80.0}))
-    assert above.tour is not None
-    assert above.tour.floor == 0.0
+    for of_file, floor in ((-300.0, -0.3), (80.0, 0.0)):
+        assert toured(constraints=rules(floor=of_file))[1].floor == pytest.approx(floor)
+    without, tour = toured(no_floor=True)
+    assert tour.floor is None
+    assert not any("gravity" in line for line in without.lines())
+    assert without.made.robot.forward(without.joints)[0][:, 2].min() < 0.0
 
 
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, 9.81), (9.81, 0.0, 0.0)])
 def test_a_ceiling_or_wall_that_carries_the_robot_is_kept_clear(gravity: tuple[float, float, float]) -> None:
-    planned = truearm.plan("irb120", poses=10, candidates=60, gravity=gravity)
-    assert planned.tour is not None
-    assert planned.tour.floor == 0.0
+    planned, tour = toured(gravity=gravity)
+    assert tour.floor == 0.0
     assert sampled_room(planned.made.robot, on_the_ways(planned), Cell()).min() >= 0.048
     words = "\n".join(planned.lines())
     assert "mm or more from the mounting surface at 0 mm" in words
     assert "Only its mounting surface is kept clear: by its gravity the robot does not stand" in words
     assert "floor" not in words
-
-
-def test_without_a_floor_an_arm_that_stands_goes_below_its_base() -> None:
-    without = truearm.plan("irb120", poses=12, candidates=60, no_floor=True)
-    assert without.tour is not None
-    assert without.tour.floor is None
-    assert not any("gravity" in line for line in without.lines())
-    assert without.made.robot.forward(without.joints)[0][:, 2].min() < 0.0
-
-
-def test_what_carries_the_robot_is_taken_away_as_a_floor_is() -> None:
-    planned = truearm.plan("irb120", poses=10, candidates=60, gravity=(0.0, 0.0, 9.81), no_floor=True)
-    assert planned.tour is not None
-    assert planned.tour.floor is None
-    assert any(line.startswith("Its mounting surface is not kept clear") for line in planned.lines())
-
-
-@pytest.mark.parametrize("gravity", [(0.0, 0.0, 9.81), (9.81, 0.0, 0.0)])
-def test_a_height_in_the_base_frame_is_no_floor_of_a_robot_that_hangs(gravity: tuple[float, float, float]) -> None:
+    away, tour = toured(gravity=gravity, no_floor=True)
+    assert tour.floor is None
+    assert any(line.startswith("Its mounting surface is not kept clear") for line in away.lines())
     with pytest.raises(InputError, match=r"(?s)does not stand by its gravity.*'-600 mm'.*keep_out") as refusal:
-        truearm.plan("irb120", poses=10, candidates=60, gravity=gravity, floor=-0.6)
+        toured(gravity=gravity, floor=-0.6)
     assert refusal.value.parameter == "floor"
 
 
 def test_a_safe_configuration_that_is_given_is_driven_from() -> None:
     home = np.deg2rad([10.0, -20, 10, 0, 30, 0]).tolist()
-    planned = truearm.plan("irb120", poses=12, candidates=60, home=home)
-    assert planned.tour is not None
-    assert planned.tour.home.tolist() == home
-    typed = truearm.plan("irb120", poses=12, candidates=60, home="10,-20,10,0,30,0").tour
-    assert typed is not None
-    assert typed.home == pytest.approx(home)
+    planned, tour = toured(home=home)
+    assert tour.home.tolist() == home
+    assert toured(home="10,-20,10,0,30,0")[1].home == pytest.approx(home)
     assert any(line.startswith("Driven from home (10, -20, 10, 0, 30, 0) and back in ") for line in planned.lines())
     assert planned.summary()["ways"]["home"] == pytest.approx([10, -20, 10, 0, 30, 0])
+
+
+def test_given_configurations_are_checked_where_room_or_boxes_are_asked_for() -> None:
+    _, data = campaign("irb120", 40, 0.05e-3, 1)
+    given: dict[str, Any] = {"poses": 12, "candidates_from": data}
+    for plain in (truearm.plan("irb120", **given), truearm.plan("irb120", **given, constraints=rules())):
+        assert plain.tour is None
+        assert plain.made.usable == 40
+        assert "ways" not in plain.summary()
+    driven, _ = toured(**given, clearance=0.05)
+    assert driven.made.usable < 40
+    assert driven.made.rejected["floor"] > 0
+    below = driven.made.robot.forward(data.joints)[0][:, 2] < 0.0
+    assert not set(np.array(data.labels)[below]) & set(driven.labels)
+    boxed, tour = toured(**given, constraints=rules(keep_out=TABLE))
+    assert boxed.made.rejected["keep_out table"] > 0
+    assert tour.distances["keep_out table"] >= 0.05
 
 
 def test_given_configurations_are_checked_where_that_is_asked_for() -> None:
@@ -181,17 +184,6 @@ def test_given_configurations_are_checked_where_that_is_asked_for() -> None:
     assert driven.made.rejected["floor"] > 0
     below = driven.made.robot.forward(data.joints)[0][:, 2] < 0.0
     assert not set(np.array(data.labels)[below]) & set(driven.labels)
-
-
-def test_boxes_to_keep_out_of_switch_the_check_on() -> None:
-    _, data = campaign("irb120", 40, 0.05e-3, 1)
-    rules = Constraints.model_validate({**HEAD, "keep_out": TABLE})
-    planned = truearm.plan("irb120", poses=12, candidates_from=data, constraints=rules)
-    assert planned.tour is not None
-    assert planned.made.rejected["keep_out table"] > 0
-    assert planned.tour.distances["keep_out table"] >= 0.05
-    only = truearm.plan("irb120", poses=12, candidates_from=data, constraints=rules.model_copy(update={"keep_out": {}}))
-    assert only.tour is None
 
 
 @pytest.mark.parametrize(("name", "height"), [("rs007l", 360), ("lrmate200id", 330), ("irb120", None)])
@@ -214,40 +206,34 @@ def test_a_pendant_with_another_base_frame_is_told_of(name: str, height: float |
 
 
 def test_a_plan_without_a_program_says_what_it_assumed_of_the_tool() -> None:
-    quick = {"poses": 10, "candidates": 30, "no_floor": True, "clearance": 0.0}
-    plain = truearm.plan("irb120", **quick)  # type: ignore[arg-type]
+    def quick(robot: str | Robot, **given: Any) -> Plan:
+        return truearm.plan(robot, **{"poses": 10, "candidates": 30, "no_floor": True, "clearance": 0.0, **given})
+
+    plain = quick("irb120")
     assert [(one.code, one.level) for one in plain.warnings] == [("tool-assumed", "note")]
     assert "target 3 at (150, 0, 125) mm (the first tool of the robot file, triangular)" in plain.warnings[0].message
     assert "Note (tool-assumed): Nobody said the targets of the flange" in "\n".join(plain.lines())
     assert plain.summary()["warnings"][0]["code"] == "tool-assumed"
     robot = plain.made.robot
-    said = truearm.plan(robot, **quick, payload="1kg,0mm,0mm,60mm")  # type: ignore[arg-type]
-    assert said.warnings == ()
-    heavy = truearm.plan(robot, **quick, payload="9kg,0mm,0mm,60mm")  # type: ignore[arg-type]
+    assert quick(robot, payload="1kg,0mm,0mm,60mm").warnings == ()
+    heavy = quick(robot, payload="9kg,0mm,0mm,60mm")
     assert [(one.code, one.level) for one in heavy.warnings] == [("overload", "warning")]
-    unknown = truearm.plan(replace(robot, rated_load=None), **quick, payload="9kg,0mm,0mm,60mm")  # type: ignore[arg-type]
-    (notice,) = unknown.warnings
+    (notice,) = quick(replace(robot, rated_load=None), payload="9kg,0mm,0mm,60mm").warnings
     assert (notice.code, notice.level) == ("rating-unknown", "note")
     assert "The flange carries 9 kg, and the robot file does not say for how much irb120 is rated" in notice.message
-    ball = truearm.plan("irb120", **quick, device="ballbar")  # type: ignore[arg-type]
+    ball = quick("irb120", device="ballbar")
     assert "target ball at (0, 0, 125) mm (as of the device ballbar)" in ball.warnings[0].message
 
 
 def test_configurations_without_a_way_are_left_out_and_counted() -> None:
     """Of two sides of a wall with a gap too narrow for the upper arm one is out of reach."""
-    rules = Constraints.model_validate(
-        {
-            **HEAD,
-            "keep_out": {"front": {"x": [80, 5000], "y": [-20, 20]}, "rear": {"x": [-5000, -80], "y": [-20, 20]}},
-        }
-    )
+    wall = {"front": {"x": [80, 5000], "y": [-20, 20]}, "rear": {"x": [-5000, -80], "y": [-20, 20]}}
     _, data = campaign("irb120", 200, 0.05e-3, 1)
     home = np.deg2rad([90.0, 60, -30, 0, 0, 0]).tolist()
-    plan = partial(truearm.plan, "irb120", poses=4, candidates_from=data, floor=-1.0)
-    planned = plan(constraints=rules, home=home, clearance=0.02)
+    given: dict[str, Any] = {"poses": 4, "candidates_from": data, "floor": -1.0, "clearance": 0.02}
+    planned, _ = toured(**given, constraints=rules(keep_out=wall), home=home)
     assert planned.made.rejected["ways"] > 0
     assert planned.made.candidates == 200
-    assert planned.tour is not None
     assert planned.joints[:, :5] == pytest.approx(data.joints[planned.made.chosen, :5])
     assert np.abs(planned.joints[:, 5]).max() <= np.pi
     assert (planned.made.robot.forward(planned.joints)[0][:, 1] > 0.0).all()
@@ -275,8 +261,7 @@ def test_pairs_for_inclinometers_are_driven(pull: float, tmp_path: Path) -> None
 
 
 def test_a_device_that_winds_no_cable() -> None:
-    planned = truearm.plan("irb120", poses=12, candidates=150, device="ballbar")
-    assert planned.tour is not None
+    planned, _ = toured(poses=12, candidates=150, device="ballbar")
     assert np.abs(planned.joints[:, 5]).max() <= np.pi
     assert "The fixtures of the device are not kept clear of." in planned.lines()
 
@@ -286,8 +271,8 @@ def test_a_device_that_winds_no_cable() -> None:
     [
         ({"floor": 0.1}, "floor", "the floor is above the base of the robot; got '100 mm'; allowed: 0 mm or less"),
         ({"floor": -0.1, "no_floor": True}, "floor, no_floor", "a floor is given and denied; got '-100 mm'"),
-        ({"floor": "0"}, "floor", "number"),
         ({"clearance": 0.9}, "clearance", "no configuration was found in which the arm keeps clear"),
+        ({"clearance": 5e-5}, "clearance", r"so little room.*'0\.05 mm'"),
         ({"home": [0.0] * 5}, "home", "6 numbers belong here"),
         ({"home": "0,0,0,0,0"}, "home", "there are not as many numbers as joints; got '5 numbers'"),
         ({"home": "0,x"}, "home", "numbers separated by commas"),
@@ -297,8 +282,11 @@ def test_a_device_that_winds_no_cable() -> None:
 )
 def test_what_cannot_be_driven_is_refused(given: dict[str, object], parameter: str, words: str) -> None:
     with pytest.raises(InputError, match=words) as refusal:
-        truearm.plan("irb120", poses=12, candidates=60, **given)  # type: ignore[arg-type]
+        toured(**given)
     assert refusal.value.parameter == parameter
+
+
+WALLS = {"a": {"x": [200, 201]}, "b": {"x": [-201, -200]}, "c": {"y": [200, 201]}, "d": {"y": [-201, -200]}}
 
 
 @pytest.mark.parametrize(
@@ -309,46 +297,39 @@ def test_what_cannot_be_driven_is_refused(given: dict[str, object], parameter: s
         ({"keep_out": {"cage": {"x": [-900, 900], "y": [-900, 900], "z": [-100, 1500]}}}, "holds the base"),
         ({"keep_out": {"block": {"x": [250, 500], "y": [-200, 200], "z": [500, 900]}}}, "is not clear.*box 'block'"),
         ({"keep_out": {str(k): {"x": [900, 950 + k]} for k in range(21)}}, "too many boxes.*'21 boxes'.*20 boxes or"),
-        (
-            {"limits": {k: [0, 0] for k in range(1, 7)}},
-            "configurations that were chosen coincide.*1 different ones of 12",
-        ),
+        ({"limits": {k: [0, 0] for k in range(1, 7)}}, "that were chosen coincide.*1 different ones of 12"),
         ({"limits": {2: [200, 300]}}, "the limits of joint 2 leave nothing.*'200 to 300 deg'.*-110 to 110"),
         ({"limits": {2: [100, 110], 3: [60, 70]}}, "no configuration was found|is not clear|not where the plan"),
+        (
+            {"keep_out": WALLS},
+            "[0-9]+ of [0-9]+ usable.*of 2400 drawn, too near to keep_out [ab] .*floor .*smaller boxes",
+        ),
     ],
 )
 def test_cells_without_room_are_refused(entries: dict[str, object], words: str) -> None:
-    rules = Constraints.model_validate({**HEAD, **entries})
+    home = {} if "a" in entries.get("keep_out", {}) else {"home": [0.0] * 6}  # type: ignore[operator]
     with pytest.raises(InputError, match=words):
-        truearm.plan("irb120", poses=12, candidates=60, constraints=rules, home=[0.0] * 6)
-
-
-def test_walls_that_leave_hardly_any_configurations_are_counted() -> None:
-    walls = {"a": {"x": [200, 201]}, "b": {"x": [-201, -200]}, "c": {"y": [200, 201]}, "d": {"y": [-201, -200]}}
-    rules = Constraints.model_validate({**HEAD, "keep_out": walls})
-    words = "[0-9]+ of [0-9]+ usable.*of 2400 drawn, too near to keep_out [ab] .*floor .*smaller boxes"
-    with pytest.raises(InputError, match=words):
-        truearm.plan("irb120", poses=12, candidates=60, constraints=rules)
+        toured(poses=12, constraints=rules(**entries), **home)
 
 
 def test_all_stops_are_written(tmp_path: Path) -> None:
     out = tmp_path / "plan.csv"
-    planned = truearm.plan("irb120", poses=12, candidates=60, out=out)
-    assert planned.tour is not None
+    planned, tour = toured(out=out)
     with (tmp_path / "plan-ways.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["stop"] for row in rows] == [stop.kind for stop in planned.tour.stops]
+    kinds = [row["stop"] for row in rows]
+    assert kinds == [stop.kind for stop in tour.stops]
     assert [row["configuration"] for row in rows if row["configuration"]] == [*planned.labels]
     joints = np.array([[float(row[f"joint_{k} [deg]"]) for k in range(1, 7)] for row in rows])
-    assert np.deg2rad(joints) == pytest.approx(planned.tour.joints)
+    assert np.deg2rad(joints) == pytest.approx(tour.joints)
     with out.open(newline="") as file:
         first = next(csv.DictReader(file))
-    approach = rows[[row["stop"] for row in rows].index("measure") - 1]
+    approach = rows[kinds.index("measure") - 1]
     assert approach["stop"] == "approach"
     assert [approach[f"joint_{k} [deg]"] for k in range(1, 7)] == [first[f"approach_{k} [deg]"] for k in range(1, 7)]
     (tmp_path / "other-ways.csv").mkdir()
     with pytest.raises(InputError, match="this is a folder"):
-        truearm.plan("irb120", poses=12, candidates=60, out=tmp_path / "other.csv")
+        toured(out=tmp_path / "other.csv")
 
 
 def test_a_plan_is_as_good_as_one_that_hits_the_floor() -> None:
@@ -402,13 +383,68 @@ def test_arms_of_other_kinds_are_driven_where_nothing_is_near(kind: str, tmp_pat
     assert len(planned.tour.measured) == 12
 
 
-def test_a_clearance_in_another_unit_is_refused() -> None:
-    with pytest.raises(InputError, match=r"so little room.*'0\.05 mm'") as refusal:
-        truearm.plan("irb120", poses=10, candidates=60, clearance=5e-5)
-    assert refusal.value.parameter == "clearance"
-
-
 def test_a_plan_says_where_links_beside_their_lines_are_kept_clear() -> None:
     planned = truearm.plan("ur5e", poses=10, candidates=60)
     assert any("links-beside" in line for line in planned.lines())
     assert [one["code"] for one in planned.summary()["warnings"]] == ["tool-assumed", "links-beside"]
+
+
+HOME = np.deg2rad([90.0, 60, -30, 0, 0, 0])
+
+
+@pytest.fixture(scope="module")
+def walled() -> Reachable:
+    """An arm on one side of a wall with a gap too narrow for it, and candidates on both sides."""
+    robot = carrying_targets(load_robot("irb120"))
+    inf = np.inf
+    walls = {
+        "front": (np.array([0.08, -0.02, -inf]), np.array([5.0, 0.02, inf])),
+        "rear": (np.array([-5.0, -0.02, -inf]), np.array([-0.08, 0.02, inf])),
+    }
+    check = CollisionCheck(robot, Cell(-1.0, boxes_of(walls), 0.02))
+    low, high = np.array([joint.range for joint in robot.joints]).T
+    drawn = np.random.default_rng(1).uniform(low, high, (400, 6))
+    clear = drawn[check.room(drawn) >= check.need]
+    return Reachable(WayFinder(check, HOME, low, high), clear, clear)
+
+
+def test_what_has_no_way_is_left_out_and_the_choices_are_bounded(walled: Reachable) -> None:
+    """A choice that prefers what has no way is asked a few times, then only what is known to have one counts."""
+    finder, q = walled.finder, walled.joints
+    far = np.argsort(finder.check.arm.robot.forward(q)[0][:, 1])  # beyond the wall first
+    rounds: list[int] = []
+    said: list[str] = []
+
+    def choose(left: np.ndarray) -> np.ndarray:
+        rounds.append(len(left))
+        return far[np.isin(far, left)][:3]
+
+    reachable = Reachable(finder, q, q)
+    chosen, cost = chosen_with_ways(choose, np.arange(len(q)), reachable, 3, said.append)
+    assert len(chosen) == 3
+    assert len(rounds) == 4
+    assert sorted(rounds, reverse=True) == rounds
+    assert reachable.known[chosen].all()
+    assert (finder.check.arm.robot.forward(q[chosen])[0][:, 1] > 0.0).all()
+    assert all(way is not None for way in finder.home_from(q[chosen]))
+    assert cost["ways"] >= 9
+    assert cost["ways"] + cost.get("straight ways", 0) + rounds[-1] == len(q)
+    assert [words for words in said if words.startswith("looking for ways that keep clear, round ")][-1][-1] == "3"
+    assert any(words.endswith("as there was no way to 3") for words in said)
+
+
+def test_too_few_with_ways_are_refused_with_what_is_in_the_way(walled: Reachable) -> None:
+    q = walled.joints
+    beyond = np.flatnonzero(walled.finder.check.arm.robot.forward(q)[0][:, 1] < -0.1)[:12]
+    with pytest.raises(
+        InputError, match=r"have a way.*0 of 12; on the straight ones most often .*near the box '(front|rear)"
+    ) as it:
+        chosen_with_ways(lambda left: left[:4], beyond, Reachable(walled.finder, q, q), 4, lambda _: None)
+    assert it.value.parameter == "home"
+    assert "4 or more" in str(it.value)
+
+
+def test_without_anything_to_keep_clear_of_the_first_choice_counts() -> None:
+    chosen, cost = chosen_with_ways(lambda left: left[:2], np.arange(5), None, 2, lambda _: None)
+    assert chosen.tolist() == [0, 1]
+    assert cost == {}

@@ -69,13 +69,9 @@ def test_a_plan_tells_of_its_program(planned: Plan) -> None:
     assert "It tells the controller of target 2 at (75, 93.7, 215) mm and of 1.5 kg at (0, 0, 60) mm." in lines
     assert "It is not verified and no safety function" in lines
     told = planned.summary()["program"]
-    assert told["language"] == "RAPID"
-    assert told["files"] == ["MEASURE.mod"]
-    assert told["order"] == list(planned.labels)
-    assert told["approached"] is True
-    assert (told["speed_mm_s"], told["joint_speed_percent"], told["dwell_s"]) == (250.0, 10.0, 2.0)
-    assert (told["wait"], told["tip"], told["load_kg"]) == ("operator", "2", 1.5)
-    assert told["joint_speeds"] == speeds
+    expected = {"language": "RAPID", "files": ["MEASURE.mod"], "order": list(planned.labels), "approached": True}
+    expected |= {"speed_mm_s": 250.0, "joint_speed_percent": 10.0, "dwell_s": 2.0, "joint_speeds": speeds}
+    assert told == told | expected | {"wait": "operator", "tip": "2", "load_kg": 1.5}
     assert [notice["code"] for notice in told["warnings"]] == ["tool-assumed"]
     assumed = told["warnings"][0]["message"]
     assert "Nobody said the targets of the flange" in assumed
@@ -104,10 +100,7 @@ def test_the_sheet_has_every_configuration_and_room_to_write(planned: Plan, fold
     page = (folder / "plan.html").read_text()
     assert "`" not in page.split("<main>")[1].split("</main>")[0]
     assert "give <code>noise</code> where you know better" in page
-    assert (
-        '<p class="notice warning" data-code="tool-assumed"><strong>Warning</strong> (tool-assumed): Nobody said'
-        in page
-    )
+    assert '<p class="notice warning" data-code="tool-assumed"><strong>Warning</strong> (tool-assumed): ' in page
     assert len(sheet) < 60_000
 
 
@@ -115,13 +108,8 @@ def test_a_plan_without_a_program_stays_a_file(tmp_path: Path) -> None:
     plain = truearm.plan("irb120", **QUICK, out=tmp_path / "plan.csv")
     assert plain.program is None
     assert "program" not in plain.summary()
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "plan-sheet.html",
-        "plan-ways.csv",
-        "plan.csv",
-        "plan.html",
-        MANIFEST,
-    ]
+    files = ["plan-sheet.html", "plan-ways.csv", "plan.csv", "plan.html", MANIFEST]
+    assert sorted(path.name for path in tmp_path.iterdir()) == files
 
 
 @pytest.mark.parametrize(
@@ -150,6 +138,9 @@ def test_a_plan_without_a_program_stays_a_file(tmp_path: Path) -> None:
         ({"wait": "input 3,0s"}, "wait", "waited for a while"),
         ({"wait": "input 3,301s"}, "wait", "up to 300 s"),
         ({"program": "krl", "wait": "input diReady"}, "wait", "digital inputs have numbers in KRL"),
+        ({"program": "urscript", "wait": "input 8"}, "wait", "has no such digital input"),
+        ({"program": "krl", "wait": "input 0"}, "wait", "has no such digital input"),
+        ({"program": "krl", "wait": "input 99999"}, "wait", "has no such digital input"),
     ],
 )
 def test_what_cannot_be_driven_is_refused(given: dict[str, Any], parameter: str, message: str) -> None:
@@ -198,17 +189,15 @@ def test_a_speed_below_the_lowest_share_of_a_language_is_told(planned: Plan) -> 
         ("lrmate200ic", "val3", "the controllers of FANUC do not speak VAL3; .*allowed: fanuc"),
         ("katana450", "fanuc", "the controllers of Neuronics do not speak .*allowed: none of the languages"),
         ("fr3", "krl", "the controllers of Franka Robotics do not speak KRL"),
+        (replace(truearm.load_robot("fr3"), maker=""), "krl", "arms of up to six joints; got '7 joints'"),
     ],
 )
-def test_a_language_that_the_controller_does_not_speak_is_refused(robot: str, program: str, message: str) -> None:
+def test_a_language_that_the_controller_does_not_speak_is_refused(
+    robot: str | Robot, program: str, message: str
+) -> None:
     with pytest.raises(InputError, match=message) as refusal:
         truearm.plan(robot, poses=20, program=program)
-    assert refusal.value.parameter == "program"
-
-
-def test_an_arm_of_seven_joints_is_refused_whoever_made_it() -> None:
-    with pytest.raises(InputError, match="arms of up to six joints; got '7 joints'"):
-        truearm.plan(replace(truearm.load_robot("fr3"), maker=""), poses=20, program="krl")
+    assert refusal.value.parameter in ("program", "robot")
 
 
 def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> None:
@@ -309,40 +298,30 @@ def test_labels_that_no_comment_can_have_are_refused(label: str) -> None:
 
 
 def test_a_folder_of_another_result_or_a_file_is_no_place(planned: Plan, folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="a plan with a program needs a folder") as refusal:
-        truearm.plan("irb120", **QUICK, program="rapid", out=tmp_path / "plan.csv")
-    assert refusal.value.parameter == "out"
-    (tmp_path / "sheet.html").write_text("mine")
-    with pytest.raises(InputError, match="was not written here by truearm") as refusal:
-        truearm.plan("irb120", **QUICK, program="rapid", out=tmp_path)
-    assert refusal.value.parameter == "out"
-    (tmp_path / "sheet.html").unlink()
-    (tmp_path / "MEASURE.mod").write_text("mine")
-    with pytest.raises(InputError, match="was not written here by truearm") as refusal:
-        truearm.plan("irb120", **QUICK, program="rapid", out=tmp_path)
-    assert (tmp_path / "MEASURE.mod").read_text() == "mine"
-    assert [path.name for path in tmp_path.iterdir()] == ["MEASURE.mod"]
-
-
-def test_programs_of_two_plans_never_stand_in_one_folder(folder: Path, planned: Plan) -> None:
+    for out, mine, words in (
+        (tmp_path / "plan.csv", "", "a plan with a program needs a folder"),
+        (tmp_path, "sheet.html", "was not written here by truearm"),
+        (tmp_path, "MEASURE.mod", "was not written here by truearm"),
+    ):
+        if mine:
+            (tmp_path / mine).write_text("mine")
+        with pytest.raises(InputError, match=words) as refusal:
+            truearm.plan("irb120", **QUICK, program="rapid", out=out)
+        assert refusal.value.parameter == "out"
+        assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(mine, "mine")] * bool(mine)
+        (tmp_path / (mine or "none")).unlink(missing_ok=True)
+    # and programs of two plans never stand in one folder
     with pytest.raises(InputError, match=r"the program of another plan is there.*got 'MEASURE\.mod'") as refusal:
         refuse_other_programs(folder, ["MEASURE.src"])
     assert refusal.value.parameter == "out"
     refuse_other_programs(folder, ["MEASURE.mod"])
 
 
-@pytest.mark.parametrize(("language", "name"), [("urscript", "8"), ("krl", "0"), ("krl", "99999")])
-def test_an_input_that_a_controller_does_not_have_is_refused(language: str, name: str) -> None:
-    with pytest.raises(InputError, match="has no such digital input") as refusal:
-        program_wanted(language, approach=False, speed=None, dwell=None, wait=f"input {name}")
-    assert refusal.value.parameter == "wait"
-
-
 def test_a_load_above_the_rated_one_is_warned_of() -> None:
     robot = replace(truearm.load_robot("irb120"), rated_load=3.0)
-    planned = truearm.plan(robot, **QUICK, program="rapid", payload="9kg,0mm,0mm,60mm", out=None)
-    assert planned.program is not None
-    (notice,) = [one for one in planned.program.warnings if one.code == "overload"]
+    made = truearm.plan(robot, **QUICK, program="rapid", payload="9kg,0mm,0mm,60mm").program
+    assert made is not None
+    (notice,) = [one for one in made.warnings if one.code == "overload"]
     assert notice.level == "warning"
     assert "carries 9 kg" in notice.message
     assert "rated for 3 kg" in notice.message

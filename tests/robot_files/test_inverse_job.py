@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,28 +46,19 @@ def test_every_pose_out_of_reach_is_told() -> None:
     assert found.summary()["poses_reached"] == 0
 
 
-def test_orientations_come_from_one_place(tmp_path: Path) -> None:
+def test_orientations_and_branches_that_cannot_be_are_refused(tmp_path: Path) -> None:
     p, R = poses()
-    with pytest.raises(InputError, match=r"the poses have no orientation.*`orientation=free`") as refusal:
-        truearm.inverse("irb120", p)
-    assert refusal.value.parameter == "rotations"
-    with pytest.raises(InputError, match="rotations, row 1: the matrix is a reflection") as refusal:
-        truearm.inverse("irb120", p, R * [[[1.0]], [[-1.0]]])
-    assert refusal.value.parameter == "rotations"
     file = tmp_path / "poses.csv"
     file.write_text("pose,x [mm],y [mm],z [mm]\nA,300,100,500\n")
-    with pytest.raises(InputError, match=r"poses.csv: the poses have no orientation; allowed: the columns") as refusal:
-        truearm.inverse("irb120", file)
-    assert refusal.value.parameter == "poses"
-    with pytest.raises(InputError, match="the file says how the poses are turned") as refusal:
-        truearm.inverse("irb120", file, R)
-    assert refusal.value.parameter == "rotations"
-    with pytest.raises(InputError, match="would be overwritten") as refusal:
-        truearm.inverse("irb120", file, orientation="free", out=file)
-    assert refusal.value.parameter == "out"
-
-
-def test_a_branch_of_an_arm_without_named_ones() -> None:
-    with pytest.raises(InputError, match="branches have no names for this robot or pose") as refusal:
-        truearm.inverse("irb120", poses()[0], branch="all", orientation="free")
-    assert refusal.value.parameter == "branch"
+    cases: list[tuple[tuple[Any, ...], dict[str, Any], str, str]] = [
+        ((p,), {}, "rotations", r"the poses have no orientation.*`orientation=free`"),
+        ((p, R * [[[1.0]], [[-1.0]]]), {}, "rotations", "rotations, row 1: the matrix is a reflection"),
+        ((file,), {}, "poses", r"poses.csv: the poses have no orientation; allowed: the columns"),
+        ((file, R), {}, "rotations", "the file says how the poses are turned"),
+        ((file,), {"orientation": "free", "out": file}, "out", "would be overwritten"),
+        ((p,), {"orientation": "free", "branch": "all"}, "branch", "have no names for this robot or pose"),
+    ]
+    for given, more, parameter, words in cases:
+        with pytest.raises(InputError, match=words) as refusal:
+            truearm.inverse("irb120", *given, **more)
+        assert refusal.value.parameter == parameter

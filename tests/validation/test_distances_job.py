@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import truearm
@@ -17,10 +18,49 @@ def seen(poses: int, seed: int, device: str | None = None) -> Dataset:
 
 def test_the_histogram_holds_every_pair() -> None:
     data = seen(20, 1)
-    judged = truearm.distances(truearm.calibrate("irb120", data, model="frames").robot, data)
-    assert judged.errors.pairs == int(judged.errors.counts.sum()) == 9 * 20 * 19 // 2
-    assert judged.lines()[1] == "1710 distances between points of 20 configurations of twin:"
-    assert judged.summary()["configurations"] == 20
+    robot = truearm.calibrate("irb120", data, model="frames").robot
+    judged = truearm.distances(robot, data)
+    found = judged.errors
+    assert found.pairs == int(found.counts.sum()) == 9 * 20 * 19 // 2
+    first, *_ = found.edges.tolist()
+    width = float(f"{np.diff(found.edges)[0]:.12g}")
+    assert f"{width:e}"[0] in "125"
+    assert first == pytest.approx(round(first / width) * width)
+    said, figures, share, *bars = judged.lines()[1:]
+    assert said == "1710 distances between points of 20 configurations of twin:"
+    assert (
+        figures
+        == f"  mean {1e3 * found.mean:.3f}  deviation {1e3 * found.deviation:.3f}  max {1e3 * found.maximum:.3f} mm"
+    )
+    assert share == f"  {100 * found.positive:.0f} % of the predicted distances are too long"
+    step = max(1, len(found.counts) // 20)
+    sums = [int(found.counts[k : k + step].sum()) for k in range(0, len(found.counts), step)]
+    assert [bar.count("#") for bar in bars] == [round(50 * count / max(sums)) for count in sums]
+    assert [float(bar.split()[0]) for bar in bars] == pytest.approx(1e3 * found.edges[:-1:step], abs=6e-4)
+    ends = [*(1e3 * found.edges[step:-1:step]), 1e3 * found.edges[-1]]
+    assert [float(bar.split()[2]) for bar in bars] == pytest.approx(ends, abs=6e-4)
+    told = judged.summary()
+    assert (told["configurations"], told["positive"]) == (20, found.positive)
+    assert told["distance_mm"]["max"] == pytest.approx(1e3 * found.maximum)
+    assert told["histogram"]["counts"] == found.counts.tolist()
+
+
+def test_loads_and_readings_that_do_not_fit_are_refused() -> None:
+    data = seen(20, 1)
+    robot = truearm.calibrate("irb120", data, model="frames").robot
+    nothing = replace(data, position=np.full_like(data.position, np.nan))
+    warm = robot.with_effects(["thermal-growth"])
+    for arm, readings, parameter, words in (
+        ("irb120", data, "robot", "the robot has no targets"),
+        (robot, replace(data, targets=("1", "2", "x")), "target", "no target of this name"),
+        (robot, nothing, "data", "there is no reading"),
+        (warm, data, "data", "the data hold no temperature"),
+        (robot, data.of_configurations([0]), "data", "two configurations or more"),
+    ):
+        with pytest.raises(InputError, match=words) as refusal:
+            truearm.distances(arm, readings)
+        assert refusal.value.parameter == parameter
+    assert truearm.distances(warm, replace(data, temperature=np.full(20, 20.0))).errors.pairs == 1710
 
 
 def test_a_robot_that_no_instrument_placed_can_be_judged() -> None:
@@ -31,11 +71,3 @@ def test_a_robot_that_no_instrument_placed_can_be_judged() -> None:
     with pytest.raises(InputError, match="compare distances with 'truearm distances'"):
         truearm.validate(robot, tip)
     assert truearm.distances(robot, tip).errors.pairs == 45
-
-
-def test_one_configuration_has_no_distances() -> None:
-    data = seen(20, 1)
-    robot = truearm.calibrate("irb120", data, model="frames").robot
-    with pytest.raises(InputError, match="two configurations or more") as refusal:
-        truearm.distances(robot, data.of_configurations([0]))
-    assert refusal.value.parameter == "data"

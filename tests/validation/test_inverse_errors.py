@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +11,24 @@ from numpy.testing import assert_allclose
 from tests.engine.robot.test_conventions import about, slid
 from tests.engine.robot.test_joint_errors import TABLE_1, TABLE_3, error, with_table_3
 
+import truearm
 from truearm.engine.base.errors import InputError
 from truearm.engine.motion.cube import DIRECTIONS, SevenLines, seven_lines, usable_joints
+from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.transform import IDENTITY, Transform
 from truearm.engine.twin.twin import Twin, measure
-from truearm.validation.lines import LineErrors, LineTest, design, fake_targets, from_data, inverted, on_twin, reduction
+from truearm.validation.lines import (
+    CONVENTION,
+    LineErrors,
+    LineTest,
+    design,
+    fake_targets,
+    from_data,
+    inverted,
+    on_twin,
+    reduction,
+)
 
 
 @pytest.fixture(scope="module")
@@ -142,3 +155,62 @@ def test_scatter_is_what_a_perfect_robot_shows(lines: SevenLines) -> None:
     robot = load_robot("kr5").with_frames(IDENTITY, {"smr": (0.0, 0.0, 0.1)})
     shown = on_twin(lines, Twin(robot), lines.joints(robot), 2e-5, 200, np.random.default_rng(1))
     assert np.mean(shown.error) == pytest.approx(2e-5 * np.sqrt(8 / np.pi), rel=0.02)
+
+
+# -- the job ---------------------------------------------------------------------------------------------
+
+CENTRE = (0.85, 0.0, 0.6)
+
+
+def test_the_job_compensates_on_a_twin_and_writes_what_to_command(lines: SevenLines, tmp_path: Path) -> None:
+    errors, nominal = with_table_3(), load_robot("kr5")
+    plan = truearm.lines("kr5", CENTRE)
+    assert (plan.before, plan.after, plan.lines()) == (None, None, ["The robot can go to all 77 poses."])
+    assert_allclose(plan.joints, lines.joints(nominal), atol=1e-12)
+    found = truearm.lines("kr5", CENTRE, joint_errors=errors, truth=errors, repeats=1, out=tmp_path / "plan.csv")
+    assert found.before is not None
+    assert found.after is not None
+    assert_allclose(found.before.error, np.linalg.norm(errors.world_poses(plan.joints)[0] - lines.position, axis=1))
+    assert found.after.error.max() < 5e-6
+    for line, said in zip(found.summary()["lines"], found.lines()[1:], strict=True):
+        rows = lines.rows(line["direction"])
+        before, after = found.before.error[rows] * 1e3, found.after.error[rows] * 1e3
+        assert (line["before_mm"]["mean"], line["after_mm"]["max"]) == pytest.approx((before.mean(), after.max()))
+        assert line["reduction_percent"] == pytest.approx(100 * (1 - after.max() / before.max()))
+        assert f"mean {before.mean():.3f}  max {before.max():.3f} mm   compensated mean {after.mean():.3f}" in said
+    table = [row.split(",") for row in (tmp_path / "plan.csv").read_text().splitlines()]
+    assert table[0] == ["configuration", *(f"joint_{k} [deg]" for k in range(1, 7))]
+    assert [row[0] for row in table[1:]] == list(lines.labels)
+    assert_allclose(np.array([row[1:] for row in table[1:]], float), np.degrees(found.joints), atol=1e-9)
+    assert found.written_at("x").endswith("77 configurations, compensated joint positions.")
+    assert plan.written_at("x").endswith("77 configurations, nominal joint positions.")
+
+
+def test_the_job_judges_what_was_measured_in_the_frame_of_one_of_its_robots(lines: SevenLines) -> None:
+    places = {"smr": (0.0, 0.0, 0.1)}
+    placed = with_table_3().with_frames(Transform((2.0, 1.0, -0.5), (0.8, 0.0, 0.0, 0.6)), places)
+    joints = lines.joints(load_robot("kr5"))
+    data = replace(measure(Twin(placed), joints, 0.0, np.random.default_rng(0)), labels=lines.labels)
+    by_errors = truearm.lines("kr5", CENTRE, joint_errors=placed, data=data).before
+    nominal = load_robot("kr5").with_frames(placed.base, places)
+    by_nominal = truearm.lines(nominal, CENTRE, joint_errors=with_table_3(), data=data).before
+    fitted = truearm.lines("kr5", CENTRE, joint_errors=with_table_3(), data=data).before
+    assert by_errors is not None
+    assert by_nominal is not None
+    assert fitted is not None
+    assert_allclose(by_errors.error, by_nominal.error, atol=1e-12)
+    # found from the lines themselves, base and target take a part of the errors away
+    assert fitted.error.mean() < 0.8 * by_errors.error.mean()
+
+
+def test_the_job_refuses_what_does_not_go_together() -> None:
+    for given, parameter, said in (
+        ({"truth": "random", "data": "x.csv"}, "truth, data", "only one of them"),
+        ({"joint_errors": "kr5"}, "joint_errors", "not described by joint errors"),
+        ({"joint_errors": converted(load_robot("irb1600"), CONVENTION)}, "joint_errors", "another robot than kr5"),
+        ({"size": (0.6, 0.0, 0.4)}, "size", "three sizes above zero"),
+        ({"centre": (2.85, 0.0, 0.6)}, "centre", "cannot go to a pose"),
+    ):
+        with pytest.raises(InputError, match=said) as refusal:
+            truearm.lines("kr5", **{"centre": CENTRE, **given})  # type: ignore[arg-type]
+        assert refusal.value.parameter == parameter

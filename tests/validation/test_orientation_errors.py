@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +10,14 @@ import pytest
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
+from truearm.engine.document.drawing import significant
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, quaternion_from_rotation, rotation_from_vector
+from truearm.validation.jobs import validate
 from truearm.validation.region import orientation_block, orientation_errors, zxz_angles
+from truearm.validation.report import validation_figures, validation_html
 
 
 def about(axis: str, angle: Array) -> Array:
@@ -110,3 +114,29 @@ def test_positions_alone_have_no_orientation() -> None:
     robot, data = with_poses(about("x", np.zeros(2)), np.zeros((2, 6)))
     plain = replace(data, quaternion=None)
     assert orientation_errors(robot, plain, errors_of(robot, plain)) is None
+
+
+def test_parts_are_drawn_and_tabled_in_degrees() -> None:
+    joints = load_robot("irb120").random_configurations(8, np.random.default_rng(2))
+    joints[0] = np.radians([0.0, 0.0, 0.0, 0.0, 90.0, 0.0])  # Theta is nearly zero there
+    robot, data = with_poses(about("x", np.linspace(1e-3, 3e-3, 8)), joints)
+    judged = validate(robot, data)
+    found = judged.orientations
+    assert found is not None
+    assert found.locked == 1
+    traces = validation_figures(judged)["orientation-parts"]["data"]
+    assert [trace["name"] for trace in traces] == ["rx", "ry", "rz", "Φ", "Θ", "Ψ"]
+    for trace, values in zip(traces, [*found.vector.T, *found.zxz.T], strict=True):
+        assert trace["y"] == pytest.approx(np.degrees(values[np.isfinite(values)]), abs=1e-4)
+    assert len({trace["marker"]["color"] for trace in traces}) == 4  # one for all three angles
+    page = validation_html(judged)
+    for name, part in found.parts.items():
+        assert part is not None
+        shown = {"phi": "Φ", "theta": "Θ", "psi": "Ψ"}.get(name, name)
+        count = 7 if name in ("phi", "psi") else 8
+        sizes = '</td><td class="n">'.join(f"{part[key]:.4f}" for key in ("mean_size", "rms", "max"))
+        assert re.search(rf">{shown}</td><td[^>]*>{count}</td><td[^>]*>{part['mean']:+.4f}".replace("+", r"\+"), page)
+        assert sizes in page
+    assert "1 readings with Θ within 3 deg of 0 or 180 are left out" in page
+    assert judged.orientation is not None
+    assert f">{significant(1e3 * judged.orientation.mean)}</td>" in page

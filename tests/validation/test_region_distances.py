@@ -14,12 +14,15 @@ from truearm.calibration.result import Calibration
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
+from truearm.engine.document.drawing import significant
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.proof import MOST_MEASURED, Proof
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import is_intact
+from truearm.validation.frames import check_proof
 from truearm.validation.jobs import validate
 from truearm.validation.region import RegionDistances, distance_block, region_distances
+from truearm.validation.report import validation_figures, validation_html
 from truearm.validation.validate import measure_farther
 
 
@@ -122,3 +125,66 @@ def test_errors_that_grow_with_the_distance_are_told() -> None:
     few = replace(grows, configuration=np.zeros(90, dtype=np.intp))
     assert few.growth is None
     assert measure_farther(few) == ()
+
+
+def test_the_page_draws_every_error_over_every_distance(run: Calibration) -> None:
+    data = run.data.of_configurations(run.held_out)
+    judged = validate(run.robot, data)
+    found = judged.distances
+    assert found is not None
+    drawn = validation_figures(judged)
+    assert {*drawn} == {"error-over-tip", "error-over-joints", "error-over-middle", "residuals"}
+    for name, distance in (
+        ("tip", 1e3 * found.tip),
+        ("joints", np.degrees(found.joints)),
+        ("middle", 1e3 * found.middle),
+    ):
+        readings, mean = drawn[f"error-over-{name}"]["data"]
+        assert readings["type"] == "scatter"
+        assert readings["x"] == pytest.approx(distance, rel=6e-4)
+        assert readings["y"] == pytest.approx(1e3 * found.error, rel=6e-4)
+        assert readings["text"][4] == f"{data.labels[data.configuration[4]]}, target {data.targets[data.target[4]]}"
+        spans = found.spans(distance)
+        assert mean["name"] == "mean of a fifth of the readings"
+        assert mean["x"] == pytest.approx([v for span in spans for v in (span.low, span.high)], rel=6e-4)
+        assert mean["y"] == pytest.approx([1e3 * span.mean for span in spans for _ in range(2)], rel=6e-4)
+        assert drawn[f"error-over-{name}"]["layout"]["xaxis"]["rangemode"] == "tozero"
+    page = validation_html(judged)
+    assert f"On {judged.errors.configurations} configurations" in judged.lines()[1]
+    assert "knows 30 training configurations" in page
+    span = found.spans(found.tip)[1]
+    row = f"{significant(1e3 * span.low, 3, 1)} to {significant(1e3 * span.high, 3, 1)}"
+    for cell in (row, str(span.readings), significant(1e3 * span.mean), significant(1e3 * span.largest)):
+        assert f">{cell}</td>" in page
+    assert judged.position is not None
+    for value in (judged.position.mean, judged.position.rms, judged.position.p95, judged.position.max):
+        assert f">{significant(1e3 * value)}</td>" in page
+    sums = judged.summary()["distance_from_training"]
+    assert [row["mean_mm"] for row in sums["tip_mm"]] == pytest.approx([1e3 * s.mean for s in found.spans(found.tip)])
+    degrees = [np.degrees(s.high) for s in found.spans(found.joints)]
+    assert [row["to"] for row in sums["joints_deg"]] == pytest.approx(degrees)
+    words = f"tips {1e3 * found.tip.min():.0f} to {1e3 * found.tip.max():.0f} mm, joints "
+    assert words + f"{np.degrees(found.joints.min()):.0f} to {np.degrees(found.joints.max()):.0f} deg" in "\n".join(
+        judged.lines()
+    )
+
+
+def test_readings_beyond_what_the_proof_lets_expect_are_told(run: Calibration) -> None:
+    data = run.data.of_configurations(run.held_out)
+    assert "beyond-proof" not in {notice.code for notice in validate(run.robot, data).warnings}
+    rng = np.random.default_rng(3)
+    off = rng.standard_normal(data.position.shape)
+    for size, levels in ((0.03e-3, []), (0.12e-3, ["warning"]), (3e-3, ["error"])):
+        moved = replace(data, position=data.position + size * off)
+        told = check_proof(run.robot, moved, errors_of(run.robot, moved))
+        assert [notice.level for notice in told] == levels, size
+    rms = 1e3 * np.sqrt(np.mean(errors_of(run.robot, moved).position_norms ** 2))
+    assert f"The positions are off by {rms:.2g} mm (root mean square)" in told[0].message
+    quiet = replace(moved, sigma=None)
+    (assumed,) = check_proof(run.robot, quiet, errors_of(run.robot, quiet))
+    assert "with 0.1 mm of noise, since no sigma is declared" in assumed.message
+    proof = run.robot.proof
+    assert proof is not None
+    changed = run.robot.with_values({"a_3": run.robot.values["a_3"] + 1e-5})
+    for robot in (changed, replace(run.robot, proof=None)):
+        assert check_proof(robot, moved, errors_of(robot, moved)) == []

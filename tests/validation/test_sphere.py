@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import truearm
 from truearm.engine.base.errors import InputError
+from truearm.engine.data.dataset import Dataset
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
@@ -78,6 +82,62 @@ def test_sphere_refusals(arm: Robot) -> None:
     plane[:, 0] = np.linspace(-1, 1, 8)  # joint 1 alone: the nest stays at one height
     with pytest.raises(InputError, match="the points lie in one plane"):
         sphere_test(arm, plane, np.full(8, 0.3), "1")
+
+
+def read_by_bars(twin: Twin, joints: Array, centre: Array) -> Dataset:
+    """Return lengths from two targets of the tool to a ball, at the first of which target 1 was taught there."""
+    count = len(joints)
+    rows = [(k, target) for k in range(count) for target in (0, 1) if k or not target]
+    places = [twin.target_frames(q) for q in joints]
+    lengths = [float(np.linalg.norm(places[k][str(target + 1)][:3, 3] - centre)) for k, target in rows]
+    lengths[0] = np.nan  # no bar is as short as that
+    lengths[7] = np.nan
+    return Dataset(
+        source="bars.csv",
+        labels=("taught", *(str(k) for k in range(1, count))),
+        joints=joints,
+        joint_kinds=("revolute",) * 6,
+        targets=("1", "2"),
+        configuration=np.array([k for k, _ in rows]),
+        target=np.array([target for _, target in rows]),
+        position=np.full((len(rows), 3), np.nan),
+        distance=np.array(lengths),
+        fixtures=("ball",),
+        fixture=np.zeros(len(rows), dtype=np.intp),
+    )
+
+
+def test_the_job_judges_each_target_about_the_ball_before_and_after_calibration(arm: Robot, tmp_path: Path) -> None:
+    other = arm.with_values({"a_3": 0.2705, "theta_offset_2": arm.values["theta_offset_2"] + 1e-3})
+    joints = arm.random_configurations(30, np.random.default_rng(5))
+    centre = other.world_poses(joints[:1], "1")[0][0]
+    data = read_by_bars(Twin(other), joints, centre)
+    for taught in (None, "taught"):
+        found = truearm.sphere(other, data, taught_at=taught, out=tmp_path / f"{taught}.html")
+        counts = [(one.target, one.fixture, len(one.lengths), one.left_out) for one in found.spheres]
+        assert counts == [("1", "ball", 28, 1 if taught else 2), ("2", "ball", 29, 0)]
+        for one in found.spheres:
+            assert one.after.largest < 1e-9
+            assert one.after.centre == pytest.approx(centre, abs=1e-9)
+            assert one.before is not None
+            assert one.before.deviation > 0.1e-3
+    lines = "\n".join(found.lines())
+    assert "from the centre that was taught at configuration taught:" in lines
+    for one, told in zip(found.spheres, found.summary()["spheres"], strict=True):
+        assert one.before is not None
+        lost = ", 1 beyond the range of the bar" if one.left_out else ""
+        assert f"{one.target} about ball, {len(one.lengths)} readings{lost}\n  nominal     mean " in lines
+        assert f"largest {1e3 * one.before.largest:.3f} mm\n  calibrated  mean" in lines
+        assert told["nominal_mm"]["largest"] == pytest.approx(1e3 * one.before.largest)
+        assert told["robot_mm"]["deviation"] == pytest.approx(1e3 * one.after.deviation)
+    page = (tmp_path / "taught.html").read_text()
+    for test in (found.spheres[0].before, found.spheres[1].before):
+        assert test is not None
+        for value in (test.mean, test.deviation, test.largest):
+            assert f">{1e3 * value:.3f}</td>" in page
+    alone = truearm.sphere(arm, data)
+    assert all(one.before is None for one in alone.spheres)
+    assert "  this robot  mean" in "\n".join(alone.lines())
 
 
 def test_pose_errors_are_those_that_were_put_in() -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ from numpy.testing import assert_allclose
 from tests.engine.robot.test_conventions import about
 from tests.engine.robot.test_joint_errors import TABLE_3, with_table_3
 
+import truearm
 from truearm.engine.base.errors import InputError
+from truearm.engine.robot.conversion import converted
+from truearm.validation.lines import CONVENTION
 from truearm.validation.tolerances import errors_of_tolerance, flange_error, joint_tolerances, tolerance_of
 
 
@@ -72,7 +76,57 @@ def test_the_worst_side_of_one_joint_is_met() -> None:
     assert found.leaning[[0, 2, 3, 4, 5]].max() == 0.0
 
 
-def test_a_hole_without_depth_is_refused() -> None:
+def test_the_job_says_what_errors_use_in_millimetres_and_degrees() -> None:
+    robot, depths = with_table_3(), [0.05, 0.06, 0.05, 0.05, 0.05, 0.07]
+    found = truearm.tolerance(robot, depths)
+    told = found.summary()
+    assert told["robot"] == robot.name
+    rows = [line.split() for line in found.lines() if line.split()[0].isdigit()]
+    for row, shown, depth, used in zip(told["joints"], rows, depths, joint_tolerances(robot, depths), strict=True):
+        assert row["depth_mm"] == pytest.approx(1e3 * depth)
+        assert row["lean_mm"] == pytest.approx(1e3 * used.delta)
+        assert row["towards_deg"] == pytest.approx(math.degrees(used.towards))
+        assert row["position_mm"] == pytest.approx(1e3 * np.array(used.position))
+        place = ", ".join(f"{1e3 * v:.4f}" for v in used.position)
+        figures = [f"{1e3 * depth:.1f}", f"{1e3 * used.delta:.4f}", f"{math.degrees(used.towards):.1f}"]
+        assert shown == [str(row["joint"]), *figures, *place.split()]
+
+
+def test_the_job_says_what_tolerances_allow_at_the_flange() -> None:
+    found = truearm.tolerance("kr5", 0.05, lean=[0, 2e-5, 0, 0, 0, 1e-5], position=1e-5)
+    robot = converted(truearm.load_robot("kr5"), CONVENTION)
+    angles = [math.atan(lean / 0.05) for lean in (0, 2e-5, 0, 0, 0, 1e-5)]
+    q = robot.random_configurations(2000, np.random.default_rng(0))
+    expected = flange_error(robot, angles, [1e-5] * 6, q)
+    told = found.summary()
+    assert told["configurations"] == 2000
+    assert [row["angle_deg"] for row in told["joints"]] == pytest.approx(np.degrees(angles))
+    assert [row["by_lean_mm"] for row in told["joints"]] == pytest.approx(1e3 * expected.leaning)
+    assert [row["by_position_mm"] for row in told["joints"]] == [pytest.approx(0.01)] * 6
+    worst, root = told["together"]["worst_mm"], told["together"]["root_of_squares_mm"]
+    assert (worst, root) == pytest.approx((1e3 * expected.together[0], 1e3 * expected.together[1]))
+    # places count for all joints alike, and leaning adds to them at one and the same configuration
+    assert 0.06 + told["joints"][1]["by_lean_mm"] < worst <= 0.06 + told["joints"][1]["by_lean_mm"] + 1e-2
+    assert f"  joint 2: {told['joints'][1]['by_lean_mm']:.4f} mm by leaning 0.0229 deg, 0.0100 mm" in "\n".join(
+        found.lines()
+    )
+    assert f"  all at their worst {worst:.3f} mm, root of the sum of squares {root:.3f} mm" in "\n".join(found.lines())
+    places = truearm.tolerance("kr5", 0.05, position=1e-5).summary()["together"]
+    assert (places["worst_mm"], places["root_of_squares_mm"]) == pytest.approx((0.06, 0.01 * 6**0.5))
+
+
+def test_what_no_tolerance_is_is_refused() -> None:
     for call in (lambda: tolerance_of(0.0, 0.0, 0.0), lambda: errors_of_tolerance(1e-3, 0.0, -0.01)):
         with pytest.raises(InputError, match=r"a hole needs a depth.*above 0 mm"):
             call()
+    cases: list[tuple[dict[str, Any], str, str]] = [
+        ({"depth": 0.0}, "depth", "a hole needs a depth"),
+        ({"depth": [0.05] * 5}, "depth", "6 lengths, or one for all"),
+        ({"lean": -1e-3}, "lean", "out of range"),
+        ({"position": -1e-3}, "position", "out of range"),
+        ({}, "robot", "not described by joint errors"),
+    ]
+    for given, parameter, said in cases:
+        with pytest.raises(InputError, match=said) as refusal:
+            truearm.tolerance("kr5", **{"depth": 0.05, **given})
+        assert refusal.value.parameter == parameter

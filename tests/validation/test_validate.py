@@ -73,16 +73,8 @@ def test_a_page_and_its_figures_are_written(calibrated: tuple[Path, Dataset], tm
     assert "4711" in page
     assert "truearm.validate(" in content["command"]
     assert "From the nearest of 20 training configurations: tips " in "\n".join(found.lines())
-    told = CliRunner().invoke(
-        program(),
-        [
-            "validate",
-            str(folder / "result" / "calibrated.yaml"),
-            str(folder / "first.csv"),
-            "--out",
-            str(tmp_path / "x"),
-        ],
-    )
+    words = ["validate", folder / "result" / "calibrated.yaml", folder / "first.csv", "--out", tmp_path / "x"]
+    told = CliRunner().invoke(program(), list(map(str, words)))
     assert told.exit_code == 0
     assert told.stdout.splitlines()[-1] == f"Written to {tmp_path / 'x'}: result.json, report.html"
 

@@ -182,16 +182,16 @@ def test_an_earlier_result_survives_a_failed_run(
 
 
 def test_existing_files_are_not_overwritten(truearm: Truearm, tmp_path: Path) -> None:
-    for name in ("mine.yaml", "check.csv", "measurements.csv"):
+    for name in ("mine.yaml", "measurements.csv"):
         (tmp_path / name).write_text("mine")
     assert "exists already" in refused(truearm, "new-robot", tmp_path / "mine.yaml")
     assert "exists already" in refused(
         truearm, "convert", "ur5", "--convention", "cpc", "--out", tmp_path / "mine.yaml"
     )
-    assert "check.csv: this exists already" in refused(truearm, "example", tmp_path)
+    assert "measurements.csv: this exists already" in refused(truearm, "example", tmp_path)
     message = refused(truearm, "demo", "--out", tmp_path)
     assert "measurements.csv: this is another file of that name, and it is not overwritten" in message
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["check.csv", "measurements.csv", "mine.yaml"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["measurements.csv", "mine.yaml"]
     assert {p.read_text() for p in tmp_path.iterdir()} == {"mine"}
 
 

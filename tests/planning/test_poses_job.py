@@ -86,7 +86,7 @@ def test_what_no_set_can_be_is_refused(tmp_path: Path) -> None:
         ("tip_orientation", {"set": "p1-p5", "tip_orientation": (1.0, 1.0, 0.0, 0.0)}, "has length 1"),
         ("target, tip", {"set": "p1-p5", "target": "a", "tip": (0, 0, 0.1)}, "only one of them can go to the poses"),
         ("target", {"set": "p1-p5", "target": "a"}, "there is no target"),
-        ("robot", {"set": "p1-p5", "lowest": 5.0}, "reaches no cube"),
+        (None, {"set": "p1-p5", "lowest": 5.0}, "reaches no cube"),
     ):
         refused(parameter, said, package.poses, "irb120", **given)
     package.poses("irb120", "p1-p5", centre=(0.35, 0.0, 0.35), side=0.2, out=tmp_path / "p.csv")

@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.expecting import known, refused
 from tests.simulated import campaign
 
 from truearm.calibration.calibrate import calibrate
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import Notice
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.changes import check_changes, find_change
 from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
@@ -47,12 +49,8 @@ def test_a_moved_instrument_is_named_with_its_configuration_and_size() -> None:
     (notice,) = told(moved_instrument(honest()[1], np.array([1.2e-3, -1.6e-3, 0.0])))
     assert (notice.code, notice.level) == ("instrument-moved", "error")
     size = re.match(f"From configuration {FIRST_MOVED + 1} on, all readings stand ([0-9.]+) mm", notice.message)
-    assert size is not None
-    assert float(size[1]) == pytest.approx(2.0, rel=0.05)
+    assert float(known(size)[1]) == pytest.approx(2.0, rel=0.05)
     assert "`base_changes`" in notice.message
-
-
-def test_a_small_motion_is_a_warning() -> None:
     (notice,) = told(moved_instrument(honest()[1], np.array([0.0, 0.0, 0.16e-3])))
     assert (notice.code, notice.level) == ("instrument-moved", "warning")
 
@@ -68,17 +66,16 @@ def test_a_moved_target_is_named() -> None:
     assert 0.9 < float(re.findall(r"stands ([0-9.]+) mm", notice.message)[0]) < 1.1
 
 
-@pytest.mark.parametrize("joint", [1, 3, 6])
-def test_a_jumped_joint_zero_is_named(joint: int) -> None:
+def test_a_jumped_joint_zero_is_named() -> None:
     _, data = honest()
-    joints = data.joints.copy()
-    joints[FIRST_MOVED:, joint - 1] += np.radians(0.2)
-    (notice,) = told(replace(data, joints=joints))
-    assert (notice.code, notice.level) == ("joint-zero-jumped", "error")
-    found = re.search(r"From configuration (\d+) on, joint (\d) stands ([0-9.]+) deg off", notice.message)
-    assert found is not None
-    assert (int(found[1]), int(found[2])) == (FIRST_MOVED + 1, joint)
-    assert 0.18 < float(found[3]) < 0.22
+    for joint in (1, 3, 6):
+        joints = data.joints.copy()
+        joints[FIRST_MOVED:, joint - 1] += np.radians(0.2)
+        (notice,) = told(replace(data, joints=joints))
+        assert (notice.code, notice.level) == ("joint-zero-jumped", "error")
+        found = known(re.search(r"From configuration (\d+) on, joint (\d) stands ([0-9.]+) deg off", notice.message))
+        assert (int(found[1]), int(found[2])) == (FIRST_MOVED + 1, joint)
+        assert 0.18 < float(found[3]) < 0.22
 
 
 def test_a_drift_is_told() -> None:
@@ -89,11 +86,10 @@ def test_a_drift_is_told() -> None:
     assert "Measure reference points" in notice.message
 
 
-@pytest.mark.parametrize("robot", ["irb120", "katana450", "kr5", "ur10"])
-def test_nothing_is_told_of_honest_campaigns(robot: str) -> None:
-    for seed in range(3):
+def test_nothing_is_told_of_honest_campaigns() -> None:
+    for robot, seed in product(("irb120", "katana450", "kr5", "ur10"), range(3)):
         _, data = campaign(robot, 40, 0.05e-3, seed)
-        assert told(replace(data, number=np.arange(40.0)), robot) == []
+        assert told(replace(data, number=np.arange(40.0)), robot) == [], (robot, seed)
 
 
 def test_rows_in_another_order_say_the_same() -> None:
@@ -146,9 +142,8 @@ def test_a_second_base_cures_a_moved_instrument(shift: tuple[float, ...], turn: 
     assert not calibrate("irb120", moved).finished
     cured = calibrate("irb120", moved, base_changes=[str(FIRST_MOVED + 1)])
     assert cured.finished
-    assert steady.validation is not None
-    assert cured.validation is not None
-    assert cured.validation.position_norms.mean() <= 1.1 * steady.validation.position_norms.mean()
+    after, before = (known(each.validation).position_norms.mean() for each in (cured, steady))
+    assert after <= 1.1 * before
     (notice,) = [n for n in cured.warnings if n.code == "base-changed"]
     assert notice.level == "note"
     assert f"from {FIRST_MOVED + 1} on by " in notice.message
@@ -156,26 +151,17 @@ def test_a_second_base_cures_a_moved_instrument(shift: tuple[float, ...], turn: 
     assert "base_changes=" in cured.command
 
 
-def test_a_second_base_where_nothing_moved_moves_nothing() -> None:
-    (notice,) = [n for n in calibrate("irb120", honest()[1], base_changes=["24"]).warnings if n.code == "base-changed"]
-    assert float(re.findall(r"by ([0-9.]+) mm", notice.message)[0]) < 0.06
-
-
-@pytest.mark.parametrize(
-    ("labels", "words"),
-    [
+def test_what_cannot_be_a_change_of_the_base_is_refused_and_what_is_none_moves_nothing() -> None:
+    data = honest()[1]
+    for labels, words in (
         (["nowhere"], "there is no configuration of this name"),
         (["1"], "nothing was measured before the first configuration"),
         (["3"], "too few training configurations"),
         ([2.5], "a name belongs here"),
         ("24", "a sequence of names belongs here"),
-    ],
-)
-def test_what_cannot_be_a_change_of_the_base_is_refused(labels: list[str], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        calibrate("irb120", honest()[1], base_changes=labels)
-
-
-def test_a_change_of_the_base_needs_the_order() -> None:
-    with pytest.raises(InputError, match="the order of measurement is not known"):
-        calibrate("irb120", replace(honest()[1], number=None, approach=None), base_changes=["24"])
+    ):
+        refused(None, words, calibrate, "irb120", data, base_changes=labels)
+    orderless = replace(data, number=None, approach=None)
+    refused(None, "the order of measurement is not known", calibrate, "irb120", orderless, base_changes=["24"])
+    (notice,) = [n for n in calibrate("irb120", data, base_changes=["24"]).warnings if n.code == "base-changed"]
+    assert float(re.findall(r"by ([0-9.]+) mm", notice.message)[0]) < 0.06

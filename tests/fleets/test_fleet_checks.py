@@ -47,6 +47,13 @@ def own(measured: Path, tmp_path: Path) -> Path:
     return tmp_path / "fleet"
 
 
+def new(measured: Path, tmp_path: Path) -> Path:
+    """Return a copy of its data alone."""
+    folder = own(measured, tmp_path)
+    shutil.rmtree(folder / "out")
+    return folder
+
+
 def run(path: Path, **given: Any) -> Fleet:
     return truearm.fleet(path, out=path.parent / "out", workers=1, **given)
 
@@ -57,49 +64,44 @@ def refused(path: Path) -> InputError:
     return caught.value
 
 
-WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "train": ({"train": -5}, "must leave some held out"),
-    "hold": ({"hold": ["bases"]}, "nothing of this name to hold; got 'bases'; allowed: base"),
-    "hold without frames": ({"hold": ["base"]}, "Give its places in a file with 'frames'."),
-    "base_changes": ({"base_changes": [1, 2]}, "nothing was measured before the first configuration"),
-    "base_changes in a short part": ({"base_changes": [4]}, "too few training configurations"),
-    "zones": ({"zones": 100}, "out of range"),
-    "seed": ({"seed": -1}, "out of range"),
-    "bootstrap": ({"bootstrap": 1}, "out of range"),
-    "without": ({"without": ["none"]}, "no configuration of this name"),
-    "monte_carlo": ({"monte_carlo": 100, "loss": "huber"}, "Leave 'loss' out"),
-}
+WRONG: tuple[tuple[dict[str, Any], str], ...] = (
+    ({"train": -5}, "must leave some held out"),
+    ({"hold": ["bases"]}, "nothing of this name to hold; got 'bases'; allowed: base"),
+    ({"hold": ["base"]}, "Give its places in a file with 'frames'."),
+    ({"base_changes": [1, 2]}, "nothing was measured before the first configuration"),
+    ({"base_changes": [4]}, "too few training configurations"),
+    ({"zones": 100}, "out of range"),
+    ({"seed": -1}, "out of range"),
+    ({"bootstrap": 1}, "out of range"),
+    ({"without": ["none"]}, "no configuration of this name"),
+    ({"monte_carlo": 100, "loss": "huber"}, "Leave 'loss' out"),
+)
 
 
-@pytest.mark.parametrize("option", WRONG)
 def test_an_option_that_no_robot_can_be_calibrated_with_is_refused_where_it_stands(
-    option: str, measured: Path, tmp_path: Path
+    measured: Path, tmp_path: Path
 ) -> None:
-    wrong, words = WRONG[option]
-    folder = own(measured, tmp_path)
-    shutil.rmtree(folder / "out")
-    told = refused(manifest(folder, [{**ROBOTS[0]}], wrong))
-    assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{next(iter(wrong))}")
-    assert words in str(told)
-    assert not (folder / "out").exists()
-    told = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "options": wrong}]))
-    assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{next(iter(wrong))}"
+    folder = new(measured, tmp_path)
+    for wrong, words in WRONG:
+        option = next(iter(wrong))
+        told = refused(manifest(folder, ROBOTS[:1], wrong))
+        assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{option}")
+        assert words in str(told)
+        assert not (folder / "out").exists()
+        told = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "options": wrong}]))
+        assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{option}"
+    told = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "robot": "nix"}]))
+    assert ("robots[2].robot" in str(told), "no such robot" in str(told)) == (True, True)
 
 
 def test_an_option_that_one_robot_of_several_cannot_be_calibrated_with_is_its_own_failure(
     measured: Path, tmp_path: Path
 ) -> None:
-    folder = own(measured, tmp_path)
-    shutil.rmtree(folder / "out")
+    folder = new(measured, tmp_path)
     few = {"name": "few", "robot": "irb120", "data": "few.csv"}
     found = run(manifest(folder, [few, ROBOTS[0]], {"train": 15}))
     assert [name for name, _ in found.analysis.failed] == ["few"]
     assert [notice.level for notice in found.warnings if notice.code == "robots-failed"] == ["warning"]
-
-
-def test_a_robot_that_nobody_knows_is_refused_where_it_stands(measured: Path, tmp_path: Path) -> None:
-    told = refused(manifest(own(measured, tmp_path), [ROBOTS[0], {**ROBOTS[1], "robot": "nix"}]))
-    assert ("robots[2].robot" in str(told), "no such robot" in str(told)) == (True, True)
 
 
 def test_a_fleet_of_which_all_robots_failed_ends_with_an_error(
@@ -131,20 +133,18 @@ def test_a_mended_manifest_goes_on_with_what_it_has_not_changed(measured: Path, 
     assert run(path).run.before == 3
 
 
-def test_mended_data_are_computed_again(measured: Path, tmp_path: Path) -> None:
+def test_mended_data_are_computed_again_and_another_fleet_does_not_go_on_there(measured: Path, tmp_path: Path) -> None:
     folder = own(measured, tmp_path)
+    for robots, chunk in ((ROBOTS[::-1], 1), (ROBOTS, 2), (ROBOTS[:1], 1)):
+        told = refused(manifest(folder, robots, chunk=chunk))
+        assert "the parts there are of another manifest" in str(told)
+        assert (folder / "out" / "robots" / "two").exists()
+    robot = "out/robots/one/calibrated.yaml"  # a file that the fleet writes
+    told = refused(manifest(folder, [*ROBOTS, {"name": "again", "robot": robot, "data": "3.csv"}]))
+    assert "stands where the fleet writes" in str(told)
     shutil.copy(folder / "3.csv", folder / "2.csv")
     found = run(manifest(folder, ROBOTS))
     assert found.run.told == ("1 part computed again, because the manifest or files of it have changed: two",)
-
-
-@pytest.mark.parametrize("change", ["another robot first", "another chunk", "a robot less"])
-def test_another_fleet_does_not_go_on_there(change: str, measured: Path, tmp_path: Path) -> None:
-    folder = own(measured, tmp_path)
-    robots = {"another robot first": ROBOTS[::-1], "another chunk": ROBOTS, "a robot less": ROBOTS[:1]}[change]
-    told = refused(manifest(folder, robots, chunk=2 if change == "another chunk" else 1))
-    assert "the parts there are of another manifest" in str(told)
-    assert (folder / "out" / "robots" / "two").exists()
 
 
 def test_a_folder_that_is_missing_is_made_again(measured: Path, tmp_path: Path) -> None:
@@ -153,17 +153,14 @@ def test_a_folder_that_is_missing_is_made_again(measured: Path, tmp_path: Path) 
     shutil.rmtree(folder / "out" / "robots" / "two")
     (folder / "out" / "robots" / "one" / "report.html").unlink()
     found = run(manifest(folder, ROBOTS))
-    assert found.run.told == (
-        "1 part computed again, because files of it are missing: robots/one/report.html",
-        "1 part computed again, because files of it are missing: "
-        "robots/two/calibrated.yaml, robots/two/result.json, robots/two/report.html, robots/two/calibrated.urdf",
-    )
+    every = ", ".join(f"robots/two/{name}" for name in ("calibrated.yaml", "result.json", "report.html"))
+    told = "1 part computed again, because files of it are missing: "
+    assert found.run.told == (f"{told}robots/one/report.html", f"{told}{every}, robots/two/calibrated.urdf")
     assert (folder / "out" / "robots" / "two" / "calibrated.yaml").read_bytes() == before
 
 
 def test_data_that_change_while_the_fleet_runs_are_not_taken_for_the_old_ones(measured: Path, tmp_path: Path) -> None:
-    folder = own(measured, tmp_path)
-    shutil.rmtree(folder / "out")
+    folder = new(measured, tmp_path)
     path = manifest(folder, ROBOTS)
     old = (folder / "2.csv").read_bytes()
 
@@ -171,6 +168,7 @@ def test_data_that_change_while_the_fleet_runs_are_not_taken_for_the_old_ones(me
         if words.startswith("part 1 of 2"):
             shutil.copy(folder / "3.csv", folder / "2.csv")
 
+    assert [*read_manifest(path).robots[0].hashes] == [folder / "1.csv"]  # each knows the files read for it
     found = run(path, progress=disturb)
     assert found.analysis.failed == (("two", "2.csv changed while the fleet ran; start it again"),)
     assert not (folder / "out" / "robots" / "two").exists()
@@ -181,8 +179,7 @@ def test_data_that_change_while_the_fleet_runs_are_not_taken_for_the_old_ones(me
 
 
 def test_data_that_are_gone_while_the_fleet_runs_are_no_failure_of_the_robot(measured: Path, tmp_path: Path) -> None:
-    folder = own(measured, tmp_path)
-    shutil.rmtree(folder / "out")
+    folder = new(measured, tmp_path)
     path = manifest(folder, ROBOTS)
 
     def disturb(words: str) -> None:
@@ -227,18 +224,6 @@ def test_links_out_of_the_folder_are_refused(link: str, measured: Path, tmp_path
     told = refused(manifest(folder, ROBOTS))
     assert ("this is a link" in str(told), told.where) == (True, str(folder / "out" / link))
     assert [*(folder / "elsewhere").iterdir()] == []
-
-
-def test_a_file_that_is_read_from_the_folder_of_a_robot_is_refused(measured: Path, tmp_path: Path) -> None:
-    folder = own(measured, tmp_path)
-    robot = "out/robots/one/calibrated.yaml"
-    told = refused(manifest(folder, [*ROBOTS, {"name": "again", "robot": robot, "data": "3.csv"}]))
-    assert "stands where the fleet writes" in str(told)
-
-
-def test_each_robot_knows_the_files_that_are_read_for_it(measured: Path) -> None:
-    one = read_manifest(manifest(measured, ROBOTS)).robots[0]
-    assert [*one.hashes] == [measured / "1.csv"]
 
 
 def test_where_ctrl_c_stops_a_fleet_the_command_says_how_many_parts_are_on_disk(

@@ -32,7 +32,7 @@ DRAWN = (
         "tests/calibration/test_report",
         "tests/compensation/test_program_picture",
     ),
-    *("tests/fleets/test_fleet_figures", "tests/simulation/test_influence_figures"),
+    *("tests/fleets/test_analysis", "tests/simulation/test_influence_figures"),
 )
 
 

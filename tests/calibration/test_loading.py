@@ -99,7 +99,7 @@ def test_auto_tells_how_it_chose(truearm: Truearm, data: Path, tmp_path: Path) -
     assert chosen["name"] == "auto"
     added = [name for name in chosen["effects"] if name != "compliance"]
     assert f"Chosen model: elastic, and what cross-validation added: {', '.join(added) or 'nothing'}\n" in run.out
-    figures, rows = ["geometric_mm", "elastic_mm", "error_mm"], ["candidates", "confirmations", "lines", "passed_over"]
+    figures, rows = ("geometric_mm", "elastic_mm", "error_mm"), ("candidates", "confirmations", "lines", "passed_over")
     assert list(way) == [*figures, "layout", "blocks", *rows]
     assert list(way["candidates"][0]) == ["effect", "taken", "gain_mm", "standard_error_mm", "reason"]
     assert {one["effect"] for one in way["candidates"] if one["taken"]} == set(chosen["effects"])
@@ -108,12 +108,12 @@ def test_auto_tells_how_it_chose(truearm: Truearm, data: Path, tmp_path: Path) -
     assert 0.01 < way["error_mm"] <= way["elastic_mm"] < 0.1 < way["geometric_mm"]
     assert found["command"].endswith(f"data.csv --model auto --payload {PAYLOAD} --out DIR")
     report = (tmp_path / "report.html").read_text()
-    assert "How the model was chosen" in report
     for one in way["candidates"]:
         gain = "–" if one["gain_mm"] is None else f"{one['gain_mm']:+.4f}"
         assert f'<td>{one["effect"]}</td><td class="n">{gain}</td>' in report
-    assert 'id="candidates"' in report
-    assert "Payload</dt><dd>2.7 kg at (50, 25, 100) mm" in report
+    payload = "Payload</dt><dd>2.7 kg at (50, 25, 100) mm"
+    for words in ("How the model was chosen", 'id="candidates"', payload):
+        assert words in report
     assert "Free fall" not in report
 
 

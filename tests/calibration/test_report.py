@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from tests.expecting import known
 
-from truearm.calibration.figures import candidates_figure, choice_sentence, curve_figure, curves_table
+from truearm.calibration.figures import candidates_figure, candidates_table, choice_sentence, curve_figure, curves_table
 from truearm.calibration.report import Report, report_html
 from truearm.calibration.result import Calibration
 from truearm.engine.base.errors import Notice
@@ -594,4 +594,7 @@ def test_small_gains_are_seen_beside_a_large_one() -> None:
     low, high = layout["range"]
     assert all(low <= place <= high for place in layout["tickvals"])
     assert np.all(np.diff(layout["tickvals"]) > 0.0)
+    row, *_, untried = (tuple(each) for each in candidates_table(selection()).rows)
+    assert row == ("joint-curve", "+0.0400", "0.0020", "taken")
+    assert untried == ("thermal-growth", "–", "–", "left out: no temperature was recorded")
     assert choice_sentence(selection()).endswith("believe the held-out one.")

@@ -19,7 +19,6 @@ from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Tool
-from truearm.engine.robot.transform import quaternion_from_rotation
 from truearm.engine.twin.truths import at_station
 from truearm.engine.twin.twin import Twin, measure
 
@@ -210,24 +209,6 @@ def test_the_sign_of_the_last_joint_is_named_for_a_target_near_its_axis() -> Non
         (notice,) = check(ROBOT, sign_of(6)(data)).warnings
         assert (notice.code, notice.level) == ("joint-sign", "error"), offset
         assert notice.message.startswith("The sign of joint 6 is opposite"), offset
-
-
-def with_orientations(order: list[int]) -> Dataset:
-    twin, data = campaign(ROBOT, 25, 0.0, 5)
-    _, R = twin.robot.world_poses(data.joints)
-    quaternion = quaternion_from_rotation(R[data.configuration])[:, order]
-    return replace(data, quaternion=quaternion, sigma=None)
-
-
-def test_quaternions_in_another_order_are_told() -> None:
-    right = with_orientations([0, 1, 2, 3])
-    assert "quaternion-order" not in {n.code for n in check(ROBOT, right).warnings}
-    found = {n.code: n for n in check(ROBOT, with_orientations([1, 2, 3, 0])).warnings}
-    assert found["quaternion-order"].level == "error"
-    assert "in the order x, y, z, w" in found["quaternion-order"].message
-    inverse = replace(right, quaternion=np.asarray(right.quaternion) * [1.0, -1.0, -1.0, -1.0])
-    told = next(n.message for n in check(ROBOT, inverse).warnings if n.code == "quaternion-order")
-    assert "turn the other way round" in told
 
 
 def test_joint_positions_of_another_row_are_told() -> None:

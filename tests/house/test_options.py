@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.expecting import refused
 from typer.testing import CliRunner
 
 import truearm
@@ -18,6 +19,7 @@ from truearm.engine.base.units import from_si, to_si
 from truearm.engine.command.kinds import Choice, Number, Whole
 from truearm.engine.command.options import Commands, command_of
 from truearm.engine.command.request import Option, Request, flag_of
+from truearm.engine.command.texts import read_region
 
 REQUESTS: dict[str, type[Request]] = {
     job: getattr(truearm, job).request for job in JOBS if hasattr(getattr(truearm, job), "request")
@@ -131,6 +133,9 @@ def test_units_are_those_at_the_edges() -> None:
     assert Number("mm").typed_again(0.005) == ["5"]
     assert from_si(Number("deg").read(90.0, "x"), "deg") == 90.0
     assert Number("%").read(50.0, "x") == 50.0
+    assert np.ravel(read_region("300..600, -200..200,100..400") or []) == pytest.approx([0.3, 0.6, -0.2, 0.2, 0.1, 0.4])
+    for text in ("300..600", "300..600,1..2,3", "300..x,1..2,3..4"):
+        refused("region", "three ranges in mm belong here", read_region, text)
 
 
 def test_a_result_keeps_what_was_asked_for_whatever_becomes_of_it() -> None:

@@ -71,6 +71,7 @@ def read_otherwise(way: str) -> Dataset:
         "angles for a vector": about(rotation_vector(R), "zyx"),
         "transposed": np.swapaxes(R, 1, 2),
         "from the wrong end": rotation_from_quaternion(np.asarray(data.quaternion)[:, [3, 0, 1, 2]]),
+        "from the other end": rotation_from_quaternion(np.asarray(data.quaternion)[:, [1, 2, 3, 0]]),
     }[way]
     return replace(data, quaternion=quaternion_from_rotation(made))
 
@@ -86,6 +87,7 @@ def read_otherwise(way: str) -> Dataset:
         ("angles for a vector", "orientation-order", "not angles about zyx of moving axes but a rotation vector"),
         ("transposed", "quaternion-order", "they turn the other way round, as transposed matrices do"),
         ("from the wrong end", "quaternion-order", "w, x, y, z were taken for x, y, z, w"),
+        ("from the other end", "quaternion-order", "in the order x, y, z, w"),
     ],
 )
 def test_the_convention_that_was_meant_is_named(way: str, code: str, words: str) -> None:
@@ -103,6 +105,11 @@ def test_a_rotation_vector_that_was_read_as_angles_is_named() -> None:
         (notice,) = orientation_slips(load_robot(robot), read)
         assert notice.code == "orientation-order"
         assert f"not angles about {order} of {axes} axes but a rotation vector" in notice.message
+
+
+def test_a_check_says_it_too_and_nothing_of_sound_orientations() -> None:
+    for data, codes in ((sound(), []), (read_otherwise("from the other end"), ["quaternion-order"])):
+        assert [n.code for n in check(ROBOT, data).warnings if n.level == "error"] == codes
 
 
 def test_the_fit_says_the_cause() -> None:

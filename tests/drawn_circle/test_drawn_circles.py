@@ -325,7 +325,7 @@ def test_pages_without_one_whole_circle_are_refused(tmp_path: Path) -> None:
 
     for noise in (0.0, 3.0):
         empty = scanned(0 * line(), noise=noise, specks=100)
-        assert "page.png: nothing is shape on the page but specks or letters" in told(empty)
+        assert "page.png: nothing is drawn on the page but specks or letters" in told(empty)
     assert "the page is dark" in told(255 - usual())
     for what, draw in NO_CIRCLE.items():
         said = "there is no circle on the page; allowed: a line over at least half a turn"
@@ -334,8 +334,8 @@ def test_pages_without_one_whole_circle_are_refused(tmp_path: Path) -> None:
         cut = scanned(0.7 * line(shape=even, centre=np.array(centre)))
         assert "the circle is cut by the edge of the page; got 'radius 20.0 mm about x" in told(cut), centre
     for smaller, aside in ((8e-3, 0.0), (0.0, 6e-3)):
-        assert "several circles are shape on the page; got 'radius" in told(two_lines(smaller, aside))
-    for smaller, aside in ((1e-3, 0.0), (0.0, 1e-3)):  # shape twice
+        assert "several circles are drawn on the page; got 'radius" in told(two_lines(smaller, aside))
+    for smaller, aside in ((1e-3, 0.0), (0.0, 1e-3)):  # drawn twice
         assert "another line, or writing, runs along the circle" in told(two_lines(smaller, aside))
 
 

@@ -70,8 +70,8 @@ def test_without_noise_the_robot_is_found() -> None:
         found = analyse(load_robot(robot), data)
         assert left_over(found, twin) < 1e-8, robot
         q = found.nominal.random_configurations(20, np.random.default_rng(3))
-        both = (made.world_poses(q, "3")[0] for made in (found.robot_with_errors, found.robot))
-        assert_allclose(*both, rtol=0, atol=1e-8, err_msg=robot)
+        ours, plain = (made.world_poses(q, "3")[0] for made in (found.robot_with_errors, found.robot))
+        assert_allclose(ours, plain, rtol=0, atol=1e-8, err_msg=robot)
 
 
 def test_axes_base_and_flange_are_where_the_twin_has_them() -> None:

@@ -287,6 +287,6 @@ def test_damaged_bags_are_refused(tmp_path: Path) -> None:
             outcomes.add("refused")
     assert "refused" in outcomes
     bag = whole["cell.bag"]
-    name = NAMES[2].encode()
-    bag.write_bytes(bag.read_bytes().replace(name, b"\x81" + name[1:]))
+    joint = NAMES[2].encode()
+    bag.write_bytes(bag.read_bytes().replace(joint, b"\x81" + joint[1:]))
     assert refused(bag, "the bag cannot be read").came == "a text that is no UTF-8"

@@ -106,7 +106,8 @@ def usual() -> NDArray[np.uint8]:
 
 
 def saved(path: Path, brightness: NDArray[Any], dpi: tuple[float, float] | None = (300, 300)) -> Path:
-    Image.fromarray(brightness).save(path, **({} if dpi is None else {"dpi": dpi}))
+    options: dict[str, Any] = {} if dpi is None else {"dpi": dpi}
+    Image.fromarray(brightness).save(path, **options)
     return path
 
 
@@ -312,9 +313,7 @@ NO_CIRCLE: dict[str, Callable[[], NDArray[np.uint8]]] = {
     "a line": lambda: page_with(lambda pen: pen.line((50, 80, 600, 500), fill=60, width=6)),
     "an ellipse": lambda: page_with(lambda pen: pen.ellipse((100, 200, 560, 400), outline=60, width=6)),
     "a disc": lambda: page_with(lambda pen: pen.ellipse((100, 100, 500, 500), fill=60)),
-    "writing": lambda: page_with(
-        lambda pen: [pen.text((20, 30 + 90 * row), "quick 0OQ8 brown", 20, font_size=90) for row in range(6)]
-    ),
+    "writing": lambda: page_with(lambda pen: pen.multiline_text((20, 30), "quick 0OQ8\n" * 6, 20, font_size=90)),
     "less than half a circle": lambda: scanned(0.7 * line(gaps=((1.0, 4.5),))),
 }
 

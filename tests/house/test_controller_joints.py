@@ -89,7 +89,7 @@ def test_a_file_is_read_and_written_as_it_is(pendant: Path, data: Dataset) -> No
 
 def test_where_joints_came_from_is_that_of_the_models_joints() -> None:
     rows = [[0.0, 10, 20, 0, 0, 0], [0, 20, 20, 5, 0, 0], [0, 30, 20, 0, 0, 0], [0, 30, 25, 0, 0, 0]]
-    joints, order = np.radians(rows), [0, 1, 2, 3]
+    joints, order = np.radians(np.array(rows)), [0, 1, 2, 3]
     there = Dataset.of(joints, np.ones((4, 3)), order=order)
     noted = Dataset.of(shown(joints), np.ones((4, 3)), order=order, joints_are="controller")
     came = in_model_joints(load_robot(FANUC), noted)
@@ -157,7 +157,7 @@ readings: [{target: tip, x: x, y: y, z: z}]
 
 def test_touched_cups_are_read_from_the_pendant(tmp_path: Path) -> None:
     robot = load_robot(FANUC)
-    q = np.radians([[0.0, 10, 20, 30, 40, 50], [5, 5, 5, 5, 5, 5], [9, 8, 7, 6, 5, 4]])
+    q = np.radians(np.array([[0.0, 10, 20, 30, 40, 50], [5] * 6, [9, 8, 7, 6, 5, 4]]))
     lines = [",".join(["cup", *(f"axis_{i} [deg]" for i in range(1, 7))])]
     lines += [",".join([f"B{i}", *map(repr, row)]) for i, row in enumerate(np.degrees(shown(q)).tolist(), 1)]
     file = tmp_path / "touches.csv"

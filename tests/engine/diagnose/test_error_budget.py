@@ -12,7 +12,7 @@ from tests.simulated import campaign
 from truearm.calibration.parts import budget_block
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import table_motion, without_table_motion
-from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
+from truearm.engine.diagnose.error_budget import ErrorBudget, Source, error_budget
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.document.document import held_by, lines_of
 from truearm.engine.fit.fit import Fit, identify
@@ -57,7 +57,7 @@ def judged(
     return known(error_budget(fit, data, first, rest)), fit, twin, rest
 
 
-def square(budget: ErrorBudget, source: str) -> float:
+def square(budget: ErrorBudget, source: Source) -> float:
     return known(budget.share(source).square)
 
 

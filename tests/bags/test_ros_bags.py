@@ -123,9 +123,7 @@ def test_wild_samples_are_set_aside_and_told(tmp_path: Path) -> None:
     assert "1 message without numbers" in str(read.lines())
     places, _ = load_robot("irb120").forward(np.radians(STOPS))
     np.testing.assert_allclose(read.data.position, places, atol=2e-5)
-
-
-def test_wild_samples_of_a_slow_camera_are_set_aside(tmp_path: Path) -> None:
+    # and of a slow camera
     times, joints, seen, positions, turns = recorded(pose_rate=7.0, stand=3.0)
     positions[[8, 12]] += [0.3, 0.0, 0.0]
     bag = write_ros2(tmp_path / "two", [*joint_messages(times, joints), *target_messages(seen, positions, turns)])
@@ -199,9 +197,7 @@ def test_missing_messages_are_told(tmp_path: Path) -> None:
     assert [(notice.code, notice.level) for notice in read.warnings] == [("messages-missing", "warning")]
     assert f"of {len(TIMES)} messages of the joints are missing" in str(read.lines())
     assert read.summary()["warnings"][0]["code"] == "messages-missing"
-
-
-def test_clocks_that_differ_are_told(tmp_path: Path) -> None:
+    # clocks that differ are told too
     for late in (0.8, -0.7, 1.6):
         _, _, seen, positions, turns = recorded(late=late)
         bag = write_ros2(tmp_path / f"{late}", [*OF_JOINTS, *target_messages(seen, positions, turns)])

@@ -61,6 +61,12 @@ def test_a_file_is_the_same_after_it_was_read(calibration: Calibration, tmp_path
     assert robot_text(robot) == text
     assert is_intact(robot)
     assert is_intact(calibration.robot)
+    # what spoke against it is kept
+    unlike = Notice("implausible", 'Signs of "joint 6": wrong.', "error")
+    doubted = replace(calibration, warnings=(*calibration.warnings, unlike)).robot
+    robot = read(robot_text(doubted), tmp_path)
+    assert (proof_of(robot).status, proof_of(robot).errors) == ("implausible", (unlike,))
+    assert is_intact(robot)
 
 
 def test_the_rounded_covariance_predicts_as_the_fit_does(calibration: Calibration) -> None:
@@ -75,14 +81,6 @@ def test_the_rounded_covariance_predicts_as_the_fit_does(calibration: Calibratio
     proof = Proof.of("at-bound", [], [], np.zeros(0), parameters, root @ root.T)
     np.testing.assert_allclose(proof.covariance, root @ root.T, atol=1e-13)
     assert proof.deviations == (1e-3, 2e-4, 0.0)
-
-
-def test_what_spoke_against_it_is_kept(calibration: Calibration, tmp_path: Path) -> None:
-    unlike = Notice("implausible", 'Signs of "joint 6": wrong.', "error")
-    doubted = replace(calibration, warnings=(*calibration.warnings, unlike)).robot
-    robot = read(robot_text(doubted), tmp_path)
-    assert (proof_of(robot).status, proof_of(robot).errors) == ("implausible", (unlike,))
-    assert is_intact(robot)
 
 
 def test_it_is_about_what_moves_the_robot(calibration: Calibration, tmp_path: Path) -> None:

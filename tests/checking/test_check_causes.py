@@ -166,9 +166,7 @@ def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
     assert {"/".join(where) for where in notice.at} == rows
     (notice,) = check(None, rows_of(honest(), 1, 19, 1 / 25.4)[0]).warnings
     assert "lie 25.4 times farther apart at configurations 20 to 24 than at the others" in notice.message
-
-
-def test_two_rows_in_metres_of_a_long_campaign_are_named_and_each_reading_alone() -> None:
+    # two rows of a long campaign are named, and a reading alone
     long = replace(campaign(ROBOT, 80, 0.05e-3, 5)[1], sigma=None)
     data, rows = rows_of(long, 41, 42, 1e-3)
     (notice,) = check(ROBOT, data).warnings

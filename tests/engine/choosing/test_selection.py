@@ -141,13 +141,17 @@ def test_one_seed_gives_one_answer() -> None:
     assert first.geometric != select(arm(), data, seed=2, candidates=FEW).geometric
 
 
-def test_what_the_data_do_not_tell_is_not_tried() -> None:
+def test_what_the_data_tell_is_tried_and_nothing_else() -> None:
     told = replace(seen(twin_of(), 12, 6), temperature=np.linspace(18.0, 25.0, 12))
     silent = replace(told, approach=None, number=None, temperature=None)
     both = [select(arm(), data, candidates=FEW) for data in (told, silent)]
     assert [tried(one) for one in both] == [{*FEW, "compliance"}, {"compliance", "backlash", "hardening"}]
     assert reason(both[1], "approach") == "the order of measurement is not known"
     assert reason(both[1], "thermal-growth") == "no temperature was recorded"
+    geared = replace(arm(), joints=tuple(replace(joint, transmission_periods=100) for joint in arm().joints))
+    data = seen(twin_of(), 16, 13, warming=5.0)
+    for robot, left_out in ((geared, set[str]()), (arm(), {"transmission-error"})):
+        assert tried(select(robot, data)) == set(SELECTABLE) - {"joint-curve"} - left_out
 
 
 def test_what_needs_loads_is_not_tried_on_an_arm_that_nothing_loads() -> None:
@@ -168,13 +172,6 @@ def test_what_needs_loads_is_not_tried_on_an_arm_that_nothing_loads() -> None:
     chosen = select(light, seen(Twin(twin), 20, 7), candidates=FEW)
     assert chosen.model.effects == ()
     assert reason(chosen, "hardening") == "the readings tell less of it than is known beforehand"
-
-
-def test_every_selectable_effect_is_tried_where_the_data_tell_it() -> None:
-    geared = replace(arm(), joints=tuple(replace(joint, transmission_periods=100) for joint in arm().joints))
-    data = seen(twin_of(), 16, 13, warming=5.0)
-    for robot, left_out in ((geared, set[str]()), (arm(), {"transmission-error"})):
-        assert tried(select(robot, data)) == set(SELECTABLE) - {"joint-curve"} - left_out
 
 
 def test_the_order_of_trials_makes_no_difference_where_there_are_too_many_to_try_all(

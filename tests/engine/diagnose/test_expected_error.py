@@ -247,9 +247,7 @@ def test_narrow_data_are_an_error_that_names_the_joints() -> None:
     assert "axis_2 (measured 16 to 24 deg, limits -110 to 110)" in notice.message
     (notice,) = (n for n in calibrated(5.0, "all").warnings if n.code == "narrow-data")
     assert "where the training error is 0.0" in notice.message
-
-
-def test_less_narrow_data_are_a_warning() -> None:
+    # less narrow data are a warning
     rng = np.random.default_rng(3)
     twin = truth_twin(IRB120, "random", rng)
     one = replace(twin, robot=twin.robot.with_frames(twin.robot.base, {"1": (0.0, 0.0, 0.125)}))

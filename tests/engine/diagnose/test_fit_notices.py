@@ -74,9 +74,7 @@ def test_pairs_tell_gain_loss_and_neither() -> None:
     old, wrong = np.linspace(0.5, 1.5, 30), np.where(np.arange(30) < 2, 100.0, 0.0)
     assert compared(old + wrong, 0.8 * old + 1.01 * wrong) == []
     assert compared(old + wrong, 1.5 * old + 0.99 * wrong) == [("worse-than-nominal", "error")]
-
-
-def test_nothing_is_claimed_of_few_pairs() -> None:
+    # nothing is claimed of few pairs
     for factor in (0.01, 100.0):
         assert compared(np.ones(6), np.full(6, factor)) == [("few-held-out", "note")]
     assert compared(np.ones(7), np.full(7, 0.01)) == []
@@ -96,9 +94,7 @@ def test_a_robot_that_is_accurate_already_is_no_error() -> None:
     codes = {notice.code for notice in truearm.calibrate("irb120", accurate, train="all").warnings}
     assert codes == {"nothing-held-out"}
     assert truearm.calibrate("irb120", accurate, model="frames").warnings == ()
-
-
-def test_no_gain_is_told_of_a_robot_that_was_calibrated_before() -> None:
+    # one that was calibrated before is accurate already
     twin_data = campaign("irb120", 80, 2e-5, 3)[1]
     first, second = twin_data.of_configurations(np.arange(40)), twin_data.of_configurations(np.arange(40, 80))
     before = truearm.calibrate("irb120", first)

@@ -135,7 +135,7 @@ def test_what_is_off_is_named_with_how_far_and_is_no_instrument_that_moved() -> 
     assert (step.code, "13 more" in step.message, step.gain is None) == ("measure-more", True, False)
 
 
-def test_a_forgotten_payload_is_named_with_its_mass() -> None:
+def test_a_forgotten_payload_is_named_with_its_mass_and_missing_masses_are_asked_for() -> None:
     step = first(elastic(), payload=None)
     assert step.code == "give-payload"
     told = float(step.message.split("about ")[1].split(" kg")[0])
@@ -145,6 +145,13 @@ def test_a_forgotten_payload_is_named_with_its_mass() -> None:
     assert other.code == "give-payload"
     assert other.message.startswith("Check what the robot carried")
     assert "instead of 0.3 kg" in other.message
+    # a robot without masses is asked for them
+    heavy = load_robot("irb120")
+    rigid = replace(heavy, masses=())
+    step = calibrate(rigid, elastic(), model="geometric").next[0]
+    assert step.code == "give-loads"
+    assert "masses" in step.message
+    assert "`payload`" in step.message
 
 
 @pytest.mark.parametrize("of_one", [False, True])
@@ -218,15 +225,6 @@ def test_what_no_effect_explains_is_not_called_noise() -> None:
     assert not any(step.code == "stop" for step in run.next)
     undeclared = calibrated(replace(elastic(poses=90, repeatability=0.02), sigma=None))
     assert not any(step.code == "stop" for step in undeclared.next)
-
-
-def test_a_robot_without_masses_is_asked_for_them() -> None:
-    heavy = load_robot("irb120")
-    rigid = replace(heavy, masses=())
-    step = calibrate(rigid, elastic(), model="geometric").next[0]
-    assert step.code == "give-loads"
-    assert "masses" in step.message
-    assert "`payload`" in step.message
 
 
 def test_how_the_fit_ended_is_followed_up() -> None:

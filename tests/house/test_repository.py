@@ -1,8 +1,7 @@
-"""What the repository holds: images are whole, capabilities have commands that tests run, and slow tests are there."""
+"""What the repository holds: images are whole, and capabilities have commands that the tests run."""
 
 from __future__ import annotations
 
-import ast
 import inspect
 import io
 import re
@@ -11,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from tests.conftest import SLOW
 from tests.house.test_documents import ROOT, blocks
 
 # -- images --------------------------------------------------------------------------------------------------------
@@ -113,14 +111,3 @@ def test_what_runs_until_it_is_stopped_is_clicked_through() -> None:
     assert commands
     assert all(f"{command} " in page.read_text() for command in commands)
     assert "serve(folder, port=0, demo=True" in inspect.getsource(test_story)
-
-
-# -- what ``script/test`` leaves to ``script/test --all`` ----------------------------------------------------------
-
-
-def test_every_slow_test_is_there() -> None:
-    for file in sorted({entry.partition("::")[0] for entry in SLOW}):
-        tree = ast.parse((ROOT / file).read_text())
-        functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-        named = {entry.partition("::")[2].partition("[")[0] for entry in SLOW if entry.startswith(f"{file}::")}
-        assert named <= functions, file

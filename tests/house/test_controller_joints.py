@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import get_args
 
@@ -321,52 +321,27 @@ def headed(folder: Path, *names: str) -> Path:
     return file
 
 
-REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
-    "both kinds": (
-        lambda folder: truearm.load_data(headed(folder, "joint_1", "axis_2")),
-        r"a file has joint positions of one kind; got 'joint_1, axis_2'.*Keep the columns of one kind",
-    ),
-    "a gap": (
-        lambda folder: truearm.load_data(headed(folder, "axis_1", "axis_3")),
-        r"the column axis_2 is missing; got 'axis_1, axis_3'; allowed: axis_1, axis_2",
-    ),
-    "no mapping": (
-        lambda folder: truearm.check(UNKNOWN, headed(folder, *(f"axis_{i}" for i in range(1, 6)))),
-        r"data.csv, column axis_1: it is not known how the controller of katana450 counts the joints.*under controller",
-    ),
-    "another count": (
-        lambda folder: truearm.check(FANUC, headed(folder, "axis_1")),
-        "Give one column axis_i for each joint",
-    ),
-    "unconverted": (
-        lambda folder: truearm.load_data(headed(folder, "axis_1")).postures,
-        r"the joint positions are the controller's.*truearm.load_data\(data, robot\)",
-    ),
-    "an unknown kind": (
-        lambda _: Dataset.of([[0.0]], [[1.0, 2, 3]], joints_are="robot"),  # type: ignore[arg-type]
-        "joints_are: there is no such kind of joint positions; got 'robot'; allowed: model, controller, converted",
-    ),
-    "plan": (
-        lambda _: truearm.plan(UNKNOWN, poses=4, joints="controller"),
-        "joints: it is not known how the controller of katana450 counts",
-    ),
-    "show": (
-        lambda _: truearm.show(UNKNOWN, joint_positions=np.zeros(5), joints_are="controller"),
-        "joints_are: it is not known how the controller of katana450 counts",
-    ),
-    "show short": (lambda _: truearm.show(FANUC, joint_positions=[0.0, 1.0]), r"joint_positions: .*"),
-    "frame": (
-        lambda _: load_robot(UNKNOWN).forward(np.zeros(5), frame="controller"),
-        "frame: it is not known where the controller of katana450 has its frames.*Say under controller",
-    ),
-    "part of a pose": (
-        lambda _: turned().inverse([[0.3, 0, 0.3]], frame="controller", orientation="free"),
-        "orientation: the controller's flange is not the model's.*`frame=base`",
-    ),
-}
+NOT_KNOWN = "it is not known how the controller of katana450 counts the joints"
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_refused(case: str, tmp_path: Path) -> None:
-    call, words = REFUSED[case]
-    refused(None, words, call, tmp_path)
+def test_what_nobody_knows_of_joints_and_frames_is_refused(tmp_path: Path) -> None:
+    words = "one kind; got 'joint_1, axis_2'.*Keep the columns of one kind"
+    refused(None, words, truearm.load_data, headed(tmp_path, "joint_1", "axis_2"))
+    words = "the column axis_2 is missing; got 'axis_1, axis_3'; allowed: axis_1, axis_2"
+    refused(None, words, truearm.load_data, headed(tmp_path, "axis_1", "axis_3"))
+    every = headed(tmp_path, *(f"axis_{number}" for number in range(1, 6)))
+    refused(None, f"data.csv, column axis_1: {NOT_KNOWN}.*under controller", truearm.check, UNKNOWN, every)
+    one = headed(tmp_path, "axis_1")
+    refused(None, "Give one column axis_i for each joint", truearm.check, FANUC, one)
+    words = r"the joint positions are the controller's.*truearm.load_data\(data, robot\)"
+    refused(None, words, lambda: truearm.load_data(one).postures)
+    words = "no such kind of joint positions; got 'robot'; allowed: model, controller, converted"
+    refused("joints_are", words, Dataset.of, [[0.0]], [[1.0, 2, 3]], joints_are="robot")
+    refused("joints", NOT_KNOWN, truearm.plan, UNKNOWN, poses=4, joints="controller")
+    show, zero = partial(truearm.show, UNKNOWN), np.zeros(5)
+    refused("joints_are", NOT_KNOWN, show, joint_positions=zero, joints_are="controller")
+    refused("joint_positions", "", truearm.show, FANUC, joint_positions=[0.0, 1.0])
+    words = "it is not known where the controller of katana450 has its frames.*Say under controller"
+    refused("frame", words, load_robot(UNKNOWN).forward, zero, frame="controller")
+    words = "the controller's flange is not the model's.*`frame=base`"
+    refused("orientation", words, turned().inverse, [[0.3, 0, 0.3]], frame="controller", orientation="free")

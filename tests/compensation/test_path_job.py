@@ -88,6 +88,7 @@ def test_what_cannot_be_followed_is_refused(calibrated: Path, tmp_path: Path) ->
     file.write_text(PATH)
     for parameter, given, said in (
         ("name", {"languages": ["rapid"], "name": "2nd"}, "cannot be called so in every language"),
+        ("move_to", {"languages": ["rapid"], "move_to": "pulses"}, "no kind of targets of this name"),
         ("seed_joints", {"seed_joints": (0.0, 0.0)}, "seed_joints"),
         ("accept", {"accept": ["anything"]}, "anything"),
     ):

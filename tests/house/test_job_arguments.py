@@ -47,6 +47,7 @@ def device(**given: Any) -> object:
         ("data", "one configuration", lambda: truearm.calibrate("irb120", DATA.of_configurations(np.array([0])))),
         ("data", "same name", lambda: truearm.calibrate("irb120", replace(DATA, targets=("x", "target_x", "3")))),
         ("bounds", "no free parameter", lambda: truearm.calibrate("irb120", DATA, bounds=BOUNDS)),
+        ("bounds", "no such file", lambda: truearm.calibrate("irb120", DATA, bounds="nothing.yaml")),
         ("effects", "take one of them", lambda: truearm.calibrate("irb120", DATA, effects=TWO_FORMS)),
         ("data", "there is no reading", lambda: truearm.check("irb120", EMPTY)),
         ("noise", "nothing can be identified", lambda: plan(noise=0.1)),

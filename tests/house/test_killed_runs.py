@@ -259,9 +259,9 @@ def test_what_has_the_name_of_a_manifest_and_is_none_is_not_overwritten(tmp_path
         assert (tmp_path / name).read_text() == text
         assert len([*tmp_path.iterdir()]) == 1
     (tmp_path / name).unlink()
+    refused(None, "truearm writes a file of this name itself", output_file, tmp_path / name)
     os.mkfifo(tmp_path / name)
     refused(None, told, output_folder, tmp_path)
-    refused(None, "truearm writes a file of this name itself", output_file, tmp_path / name)
 
 
 def test_a_mark_removes_no_file_that_its_run_did_not_make(tmp_path: Path) -> None:

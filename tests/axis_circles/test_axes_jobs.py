@@ -104,6 +104,7 @@ def test_measured_lines_are_judged_by_the_frames_of_the_joint_errors(found: Axis
     judged = package.lines("kr5", CENTRE, joint_errors=found.robot_with_errors, data=data)
     largest = known(judged.before).largest("xyz")
     assert judged.after is None
+    assert judged.summary()["lines"][0].keys() >= {"direction", "before_mm"}
     assert largest == pytest.approx(3.7e-3, abs=0.6e-3)
     placed = package.lines("kr5", CENTRE, data=data)  # base and target fitted to the lines themselves
     assert known(placed.before).largest("xyz") < largest
@@ -154,6 +155,7 @@ def test_refusals_name_the_parameter(found: AxisCalibration, data: Dataset, tmp_
     refused("size", "three sizes above zero", lines, CENTRE, size=(0.6, 0.0, 0.4))
     refused("truth, data", "only one of them", lines, CENTRE, truth="nominal", data="x.csv")
     refused("truth", "Did you mean axis-tests", lines, CENTRE, truth="axis-test")
+    refused("truth", "a truth belongs here", lines, CENTRE, truth=4)
     refused("joint_errors", "not described by joint errors", lines, CENTRE, joint_errors="kr5")
     other = replace(data, joints=data.joints[:, :5], joint_kinds=data.joint_kinds[:5], approach=None)
     refused("data", "joints", axes, other, measurement_frame="robot")

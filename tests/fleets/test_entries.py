@@ -64,6 +64,7 @@ REFUSED = {
     "a missing file": (HEADER + ROW + "two,ur5,c.csv,,,,,\n", "robots.csv, line 3, column data", "no such file"),
     "a missing robot file": (HEADER + "one,leg.yaml,a.csv,,,,,\n", "line 2, column robot", "no such file"),
     "two robots of one name": (HEADER + ROW + "One,ur5,b.csv,,,,,\n", "line 3, column name", "same name"),
+    "one name, few columns": ("name,robot,data\none,ur5,a.csv\none,ur5,b.csv\n", "line 3, column name", "same name"),
     "a name that is no folder": (HEADER + "../one,ur5,a.csv,,,,,\n", "line 2, column name", "cannot be a name"),
     "an unknown column": ("name,robot,data,modell\none,ur5,a.csv,geometric\n", "line 1", "Did you mean model?"),
     "a column twice": ("name,robot,data,of,of\none,ur5,a.csv,1,2\n", "line 1", "two columns"),

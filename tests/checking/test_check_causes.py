@@ -235,7 +235,12 @@ def test_joint_positions_that_belong_to_no_row_are_told_and_not_their_readings()
     (notice,) = check(ROBOT, one_target_of(wrong)).warnings
     assert notice.code == "outliers"
     assert notice.message.startswith("1 reading is far from where it must be (configuration/target): 5/1 (")
-    found = {n.code for n in calibrate(ROBOT, wrong).warnings}  # nor is it another robot because of one wrong row
+
+
+def test_a_robot_is_not_another_one_because_of_one_wrong_row() -> None:
+    joints = honest().joints.copy()
+    joints[3, 2] += 0.2
+    found = {n.code for n in calibrate(ROBOT, replace(honest(), joints=joints)).warnings}
     assert ("joints-mistaken" in found, "wrong-robot" in found) == (True, False)
 
 

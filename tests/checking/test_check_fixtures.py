@@ -67,8 +67,12 @@ def test_mistakes_of_a_ballbar_are_named() -> None:
         ),
     ):
         assert words in codes(wrong)[code]
+
+
+def test_a_misspelled_fixture_is_refused_with_its_likeness() -> None:
+    data = with_a_misspelled_fixture(campaign("ballbar")[1])
     words = r"fixture cup1.*got '1 reading among 60.*Did you mean cup_1"
-    refused(None, words, calibrate, ROBOT, with_a_misspelled_fixture(data), train="all")
+    refused(None, words, calibrate, ROBOT, data, train="all")
 
 
 def test_rows_in_another_order_are_not_called_a_joint_in_another_unit() -> None:

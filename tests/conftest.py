@@ -29,11 +29,10 @@ DRAWN = (
     *(
         "tests/studio/",
         "tests/engine/document/",
-        "tests/calibration/test_curve_figures",
         "tests/calibration/test_report",
+        "tests/compensation/test_program_picture",
     ),
-    *("tests/calibration/test_selection_figure", "tests/compensation/test_program_picture"),
-    *("tests/fleets/test_fleet_figures", "tests/simulation/test_influence_figures"),
+    *("tests/fleets/test_analysis", "tests/simulation/test_influence_figures"),
 )
 
 

@@ -1,4 +1,4 @@
-"""Axes, frames, parameters and joint errors from circles, against twins."""
+"""Axes, frames, parameters and joint errors from circles, against twins; runs and turns of single joints."""
 
 from __future__ import annotations
 
@@ -9,10 +9,20 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.engine.robot.test_joint_errors import with_table_3
+from tests.expecting import refused
 
-from truearm.axis_circles.fit import NORMAL_95, AxisAnalysis, AxisProblem, analyse, axis_circles, fit_axes
+from truearm.axis_circles.fit import (
+    NORMAL_95,
+    AxisAnalysis,
+    AxisProblem,
+    analyse,
+    axis_circles,
+    find_runs,
+    fit_axes,
+    turn_of,
+)
 from truearm.axis_circles.result import AxisCalibration
-from truearm.engine.base.errors import InputError
+from truearm.engine.data.circles import fit_circle
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.robot.chain import Array
@@ -54,28 +64,22 @@ def left_over(found: AxisAnalysis, twin: Twin) -> float:
 # -- the truth comes back --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("robot", ["irb120", "kr5", "ur5", "puma560", "lrmate200ic"])
-def test_without_noise_the_robot_is_found(robot: str) -> None:
-    twin, data = campaign(robot, 0.0)
-    found = analyse(load_robot(robot), data)
-    assert left_over(found, twin) < 1e-8
-    q = found.nominal.random_configurations(20, np.random.default_rng(3))
-    assert_allclose(
-        found.robot_with_errors.world_poses(q, "3")[0], found.robot.world_poses(q, "3")[0], rtol=0, atol=1e-8
-    )
+def test_without_noise_the_robot_is_found() -> None:
+    for robot in ("irb120", "kr5", "ur5", "puma560", "lrmate200ic"):
+        twin, data = campaign(robot, 0.0)
+        found = analyse(load_robot(robot), data)
+        assert left_over(found, twin) < 1e-8, robot
+        q = found.nominal.random_configurations(20, np.random.default_rng(3))
+        ours, plain = (made.world_poses(q, "3")[0] for made in (found.robot_with_errors, found.robot))
+        assert_allclose(ours, plain, rtol=0, atol=1e-8, err_msg=robot)
 
 
-def test_axes_are_where_the_twin_has_them() -> None:
+def test_axes_base_and_flange_are_where_the_twin_has_them() -> None:
     twin, data = campaign("irb120", 0.0)
     found = analyse(load_robot("irb120"), data)
     for axis, true in zip(joint_axes(found.measured.robot), joint_axes(twin.robot), strict=True):
         assert_allclose(axis.along, true.along, rtol=0, atol=1e-9)
         assert np.linalg.norm(true.nearest(axis.point) - axis.point) < 1e-9
-
-
-def test_base_and_flange_lie_on_the_axes_as_those_of_the_nominal_robot_do() -> None:
-    twin, data = campaign("irb120", 0.0)
-    found = analyse(load_robot("irb120"), data)
     axes, plain = joint_axes(twin.robot), joint_axes(found.nominal)
     base, flange = base_and_flange(found.nominal)
     for (place, _, _), (first, second), nominal in (
@@ -168,14 +172,8 @@ def test_circles_see_24_sums_and_name_the_rest(kr5: Dataset) -> None:
     for name in fit.free.names:
         expected = sum(weight * true[n] for n, weight in fit.combination(name).items())
         assert fit.robot.values[name] == pytest.approx(expected, abs=1e-8)
-    assert [r.combination for r in fit.redundancies] == [
-        "ez_1 - ey_2",
-        "ez_2 - ey_4",
-        "ez_3 - ey_4",
-        "ez_4 + ey_5",
-        "ez_5 - ey_6",
-        "ez_6",
-    ]
+    held = ["ez_1 - ey_2", "ez_2 - ey_4", "ez_3 - ey_4", "ez_4 + ey_5", "ez_5 - ey_6", "ez_6"]
+    assert [r.combination for r in fit.redundancies] == held
     assert fit.moving_flange == ("ez_6",)
 
 
@@ -227,9 +225,7 @@ def test_undeclared_noise_is_found_from_what_the_circles_leave() -> None:
     found = axis_circles(replace(data, sigma=None))
     assert not found.declared
     assert found.circles[0].circle.sigma == pytest.approx(0.03e-3, rel=0.05)
-
-
-def test_a_target_on_the_axis_is_left_out_if_there_are_others() -> None:
+    # a target on the axis is left out if there are others
     _, data = campaign("irb120", 0.02e-3)
     found = axis_circles(data)
     assert {c.target for c in found.circles if c.joint == 6} == {"2", "3"}
@@ -245,22 +241,84 @@ def test_poses_that_belong_to_no_run_are_counted() -> None:
     assert "left-out" in {n.code for n in found.notices}
 
 
-def refused(robot: str, data: Dataset, match: str) -> None:
-    with pytest.raises(InputError, match=match):
-        analyse(load_robot(robot), data)
-
-
 def test_what_cannot_be_used_is_refused() -> None:
     rng = np.random.default_rng(0)
     twin = truth_twin(load_robot("irb120"), "nominal", rng)
-    refused("irb120", measure(twin, runs()[: 4 * 42], 0.0, rng), "no run of joint 5, 6")
-    refused(
-        "irb120", measure(twin, load_robot("irb120").random_configurations(9, rng), 0.0, rng), "one joint moves alone"
-    )
+    few, wild = (measure(twin, q, 0.0, rng) for q in (runs()[:168], load_robot("irb120").random_configurations(9, rng)))
     data = measure(twin, runs(), 1e-5, rng)
-    refused("katana450", data, "other joints than katana450.*allowed: 5")
-    backwards = replace(data, joints=data.joints * [1, 1, 1, -1, 1, 1])
-    refused("irb120", backwards, "joint 4 does not turn as the robot file says")
-    short = measure(twin, np.concatenate([runs()[:210], runs()[210:214] * 0.01]), 2e-5, rng)
-    refused("irb120", short, "joint 6.*arc is too short|no run of joint 6")
-    refused("irb120", replace(data, joint_kinds=(*data.joint_kinds[:5], "prismatic")), "joint 6: a joint that slides")
+    refused(None, "other joints than katana450.*allowed: 5", analyse, load_robot("katana450"), data)
+    for wrong, told in (
+        (few, "no run of joint 5, 6"),
+        (wild, "one joint moves alone"),
+        (replace(data, joints=data.joints * [1, 1, 1, -1, 1, 1]), "joint 4 does not turn as the robot file says"),
+        (
+            measure(twin, np.concatenate([runs()[:210], runs()[210:214] * 0.01]), 2e-5, rng),
+            "joint 6.*arc is too short|no run of joint 6",
+        ),
+        (replace(data, joint_kinds=(*data.joint_kinds[:5], "prismatic")), "joint 6: a joint that slides"),
+    ):
+        refused(None, told, analyse, load_robot("irb120"), wrong)
+
+
+# -- runs and turns ------------------------------------------------------------------------------------------------
+
+
+def read_at(joints: Array) -> Dataset:
+    rng = np.random.default_rng(0)
+    return measure(truth_twin(load_robot("irb120"), "nominal", rng), joints, 0.0, rng)
+
+
+def sweep(joint: int, degrees: Array, others: Array) -> Array:
+    rows = np.tile(np.radians(others), (len(degrees), 1))
+    rows[:, joint - 1] = np.radians(degrees)
+    return rows
+
+
+def test_runs_are_where_one_joint_alone_moves() -> None:
+    home, ahead = np.zeros(6), np.array([10.0, -20, 30, 0, 20, 0])
+    angles = np.arange(-60.0, 61.0, 15)
+    both = np.concatenate([angles, angles[::-1]])
+    rng = np.random.default_rng(1)
+    flicker = np.radians(rng.uniform(-0.002, 0.002, (len(angles), 6)))
+    wild = load_robot("irb120").random_configurations(5, rng)
+    joints = np.concatenate([sweep(1, both, home), wild, sweep(5, angles, ahead) + flicker, sweep(5, angles[:3], home)])
+    runs = find_runs(read_at(joints))
+    assert [run.joint for run in runs] == [1, 5]
+    assert runs[0].configurations.tolist() == list(range(18))
+    assert runs[1].configurations.tolist() == list(range(23, 32))
+    assert find_runs(read_at(load_robot("irb120").random_configurations(12, np.random.default_rng(2)))) == ()
+
+
+def test_a_run_may_begin_where_another_ended() -> None:
+    angles = np.arange(0.0, 50.0, 10)
+    second = sweep(3, angles[1:], np.array([40.0, 0, 0, 0, 0, 0]))
+    runs = find_runs(read_at(np.concatenate([sweep(1, angles, np.zeros(6)), second])))
+    assert [(run.joint, run.configurations.tolist()) for run in runs] == [(1, [0, 1, 2, 3, 4]), (3, [4, 5, 6, 7, 8])]
+
+
+def test_errors_and_backlash_of_more_than_a_turn_come_back() -> None:
+    reading = np.radians(np.concatenate([np.arange(-400.0, 401, 10), np.arange(400.0, -401, -10)]))
+    lag = np.radians(0.03) * np.repeat([-0.5, 0.5], len(reading) // 2)
+    angle = reading + lag + np.radians(0.05) * np.sin(2 * reading)
+    for sense in (1, -1):
+        points = np.column_stack([0.2 * np.cos(angle), sense * 0.2 * np.sin(angle), np.full(len(angle), 0.1)])
+        turn = turn_of(fit_circle(points), reading)
+        assert_allclose(turn.circle.normal, [0, 0, sense], atol=1e-12)
+        assert turn.backlash == pytest.approx(math.radians(0.03), abs=1e-9)
+        assert turn.angular == pytest.approx(math.radians(0.13), rel=2e-2)
+        assert turn.tangential == pytest.approx(0.2 * turn.angular)
+    # a run one way shows none
+    reading = np.radians(np.arange(0.0, 100, 10))
+    points = np.column_stack([np.cos(reading), np.sin(reading), np.zeros(len(reading))])
+    assert turn_of(fit_circle(points), reading).backlash is None
+
+
+def test_a_lagging_joint_of_a_twin_is_seen() -> None:
+    twin = truth_twin(load_robot("irb120"), "nominal", np.random.default_rng(0))
+    lazy = Twin(replace(twin.robot), {4: JointTruth(hysteresis=-math.radians(0.037) / 2)})
+    angles = np.arange(-150.0, 151.0, 10)
+    joints = sweep(4, np.concatenate([angles, angles[::-1]]), np.zeros(6))
+    data = measure(lazy, joints, 0.0, np.random.default_rng(0))
+    (run,) = find_runs(data)
+    turn = turn_of(fit_circle(data.position[data.target == 1]), joints[run.configurations, 3])
+    assert turn.backlash == pytest.approx(math.radians(0.037), rel=1e-6)

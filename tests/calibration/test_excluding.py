@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.commanding import Truearm
+from tests.expecting import known, refused
 from tests.simulated import campaign
-from typer.testing import CliRunner
 
 from truearm.calibration.calibrate import calibrate
 from truearm.checking.check import check
-from truearm.commands import program
-from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.excluded import Exclusion, exclusions_text, numbers_read, read_exclusions, without_readings
 from truearm.engine.data.readers.canonical import csv_text
@@ -83,48 +82,41 @@ def test_who_excludes_from_the_held_out_part_is_told_what_it_is_worth_with_them(
     assert told.level == "warning"
     assert "1 reading of the held-out part is excluded: looks wrong (1)." in told.message
     whole = calibrate("irb120", csv, model="offsets")
-    with_it = errors_of(found.fit.robot, whole.data.of_configurations(whole.held_out)).position
-    assert with_it is not None
-    assert found.validation is not None
-    assert found.validation.position is not None
+    with_it = known(errors_of(found.fit.robot, whole.data.of_configurations(whole.held_out)).position)
+    without = known(known(found.validation).position)
     assert f"With it the held-out errors are {with_it.mean * 1e3:.3f} mm on average" in told.message
-    assert f"{with_it.max * 1e3:.3f} mm at most; without it {found.validation.position.mean * 1e3:.3f}" in told.message
+    assert f"{with_it.max * 1e3:.3f} mm at most; without it {without.mean * 1e3:.3f}" in told.message
     only_training = _file(tmp_path, (TRAINING[0], "2", "beam broken"))
     fit = calibrate("irb120", csv, model="offsets", exclude=only_training)
     assert "held-out-excluded" not in [one.code for one in fit.warnings]
-
-
-def test_what_stands_in_a_configuration_that_is_left_out_belongs_to_no_part(csv: Path, tmp_path: Path) -> None:
+    # what stands in a configuration that is left out belongs to no part
     file = _file(tmp_path, ("3", "2", "beam broken"))
     found = calibrate("irb120", csv, model="offsets", exclude=file, without=["3"])
     assert "Excluded: 1 reading (1 of configurations that are left out): beam broken (1)" in found.lines()
 
 
-def test_what_is_excluded_is_no_longer_found_and_counted(csv: Path, tmp_path: Path) -> None:
+def test_what_is_excluded_is_no_longer_found_and_counted(truearm: Truearm, csv: Path, tmp_path: Path) -> None:
     before = check("irb120", csv)
     assert "outliers" in [one.code for one in before.warnings]
     file = _file(tmp_path, (HELD_OUT[0], "2", "touched"))
-    done = CliRunner().invoke(program(), ["check", "irb120", str(csv), "--exclude", str(file), "--json"])
-    found = {one["code"]: one for one in json.loads(done.stdout)["warnings"]}
+    done = truearm("check", "irb120", csv, "--exclude", file, "--json")
+    found = {one["code"]: one for one in json.loads(done.out)["warnings"]}
     assert "outliers" not in found
     assert found["excluded"]["level"] == "note"
     assert "1 reading is excluded: touched (1). Excluded readings count as missing." in found["excluded"]["message"]
     assert "missing" not in found  # whoever has excluded it knows that it is
     assert "falsifies the proof" in found["excluded"]["message"]
-    words = ["calibrate", "irb120", str(csv), "--model", "offsets", "--exclude", str(file), "--json"]
-    done = CliRunner().invoke(program(), [*words, "--out", str(tmp_path / "r")])
-    assert json.loads(done.stdout)["excluded"][0]["part"] == "held out"
+    words = ["calibrate", "irb120", csv, "--model", "offsets", "--exclude", file, "--json"]
+    assert json.loads(truearm(*words, "--out", tmp_path / "r").out)["excluded"][0]["part"] == "held out"
 
 
 def test_one_of_several_visits_and_reference_points_are_excluded(tmp_path: Path) -> None:
     twice = Dataset.of(np.zeros((2, 6)), np.ones((2, 1, 3)), configurations=["a", "b"])
     double = replace(twice.of_readings([0, 0, 1]), visit=np.array([1, 2, 1]), references=twice.of_readings([0, 1]))
-    assert double.references is not None
-    named = replace(double, references=replace(double.references, targets=("nest",)))
+    named = replace(double, references=replace(known(double.references), targets=("nest",)))
     made, counts = without_readings(named, [Exclusion("a", "1", "x", visit="2"), Exclusion("b", "nest", "y")])
     assert np.isnan(made.position[:, 0]).tolist() == [False, True, False]
-    assert made.references is not None
-    assert np.isnan(made.references.position[:, 0]).tolist() == [False, True]
+    assert np.isnan(known(made.references).position[:, 0]).tolist() == [False, True]
     assert counts == (1, 1)
     assert without_readings(named, [Exclusion("a", "1", "x")])[1] == (2,)
     text = exclusions_text([Exclusion("a", "1", "x", visit="2"), Exclusion("b", "nest", "y")])
@@ -152,9 +144,7 @@ def test_a_reading_that_is_not_the_one_that_was_excluded_is_refused(csv: Path, t
     path.write_text(f"{head}5,1,beam broken,{x:.4f} {y + 0.01:.4f} {z:.4f}\n")
     words = "line 2: another reading stands here in the measurements than the one that was excluded"
     for job in (check, calibrate):
-        with pytest.raises(InputError, match=rf"excluded\.csv, {words}.* that was made for these") as told:
-            job("irb120", csv, exclude=path)
-        assert told.value.parameter == "exclude"
+        refused("exclude", rf"excluded\.csv, {words}.* that was made for these", job, "irb120", csv, exclude=path)
 
 
 def test_what_was_read_is_compared_whatever_was_measured() -> None:
@@ -163,9 +153,9 @@ def test_what_was_read_is_compared_whatever_was_measured() -> None:
     assert numbers_read(twice) == [(0.0, 1.0, 2.0), (3.0, 4.0, 5.0), (3.0, 4.0, 5.0)]
     both = Exclusion("b", "1", "x", read=((3.0, 4.0, 5.0), (3.0, 4.0, 5.0)))
     assert without_readings(twice, [both])[1] == (2,)
-    with pytest.raises(InputError, match="another reading"):  # it was read once more since
-        without_readings(twice, [replace(both, read=both.read[:1])])
-    assert without_readings(twice, [replace(both, read=both.read[:1], visit="2")])[1] == (1,)
+    once = replace(both, read=both.read[:1])  # it was read once more since
+    refused(None, "another reading", without_readings, twice, [once])
+    assert without_readings(twice, [replace(once, visit="2")])[1] == (1,)
     lengths = replace(
         plain,
         position=np.full((2, 3), np.nan),
@@ -175,15 +165,14 @@ def test_what_was_read_is_compared_whatever_was_measured() -> None:
     )
     assert numbers_read(lengths) == [(0.5,), (0.25,)]
     assert without_readings(lengths, [Exclusion("a", "1", "x", read=((0.5,),))])[1] == (1,)
-    with pytest.raises(InputError, match="got '250 mm in"):
-        without_readings(lengths, [Exclusion("b", "1", "x", read=((0.5,),))])
+    refused(None, "got '250 mm in", without_readings, lengths, [Exclusion("b", "1", "x", read=((0.5,),))])
     text = exclusions_text([both, Exclusion("a", "1", "y")])
     assert text == "configuration,target,reason,read [mm]\nb,1,x,3000 4000 5000; 3000 4000 5000\na,1,y,\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "what"),
-    [
+def test_files_that_exclude_nothing_that_was_read_are_refused(csv: Path, tmp_path: Path) -> None:
+    path = tmp_path / "excluded.csv"
+    for text, what in (
         ("configuration,target,reason,read\n1,1,x,1 2 3\n", "line 1, read: no unit is given"),
         ("configuration,target,reason,read [deg]\n1,1,x,1 2 3\n", "line 1, read: this unit does not fit here"),
         ("configuration,target,reason,read [mm]\n1,1,x,1 2 three\n", "line 2, column read .mm.: numbers with blanks"),
@@ -197,11 +186,6 @@ def test_what_was_read_is_compared_whatever_was_measured() -> None:
         ("configuration,target,reason\n241,1,x\n", "line 2: there is no configuration of this name; got '241'"),
         ("configuration,target,reason\n1,tip,x\n", "line 2: there is no target of this name; got 'tip'"),
         ("configuration,target,reason,visit\n1,1,x,2\n", "line 2: nothing was read there"),
-    ],
-)
-def test_files_that_exclude_nothing_that_was_read_are_refused(text: str, what: str, csv: Path, tmp_path: Path) -> None:
-    path = tmp_path / "excluded.csv"
-    path.write_text(text)
-    with pytest.raises(InputError, match=rf"excluded\.csv, {what}") as told:
-        check("irb120", csv, exclude=path)
-    assert told.value.parameter == "exclude"
+    ):
+        path.write_text(text)
+        refused("exclude", rf"excluded\.csv, {what}", check, "irb120", csv, exclude=path)

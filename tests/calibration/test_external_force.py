@@ -59,6 +59,9 @@ def test_a_sideways_force_leans_on_what_gravity_did_not_load(by_gravity: Robot) 
     assert "compliance_1" in told["compliance-unseen"].message
     assert "It loads axis_1 with " in told["compliance-unseen"].message
     assert told["force-taken"].level == "note"
+    rigid = said(calibrated("offsets", 0.0))
+    assert rigid["force-on-rigid-model"].level == "warning"
+    assert "force-taken" not in rigid
 
 
 def test_what_was_pushed_in_calibration_is_known(by_force: Robot) -> None:
@@ -66,6 +69,11 @@ def test_what_was_pushed_in_calibration_is_known(by_force: Robot) -> None:
     assert list(told) == ["force-taken"]
     assert "moves its tip by up to 0." in told["force-taken"].message
     assert "known to 0.0" in told["force-taken"].message
+    told = said(replace(by_force, proof=None), Wrench((0.0, 5.0, 0.0)))  # it bends as its values say
+    assert list(told) == ["force-taken"]
+    assert "known to" not in told["force-taken"].message
+    assert check_force([]) == check_force([(by_force, np.zeros((3, 6)))]) == []
+    assert check_force([(by_force.with_wrench(SIDEWAYS), np.full((2, 6), np.nan))]) == []
 
 
 def test_the_force_that_is_told_is_as_uncertain_as_the_twin_is_off(by_force: Robot) -> None:
@@ -90,12 +98,6 @@ def test_loads_beyond_those_of_the_calibration_are_told(by_gravity: Robot) -> No
     assert "(measured with -0." in message
 
 
-def test_a_rigid_model_does_not_bend() -> None:
-    told = said(calibrated("offsets", 0.0))
-    assert told["force-on-rigid-model"].level == "warning"
-    assert "force-taken" not in told
-
-
 def test_the_rated_load_counts_payload_and_force(by_force: Robot) -> None:
     told = said(by_force.with_payload("2kg,0mm,0mm,60mm"))
     assert told["rated-load-exceeded"].level == "warning"
@@ -112,16 +114,3 @@ def test_another_base_of_the_controller_is_told(by_force: Robot) -> None:
     assert "`wrench_frame=controller`" in told.message
     assert "force-in-model-base" not in said(turned, Wrench((0.0, -14.0, 0.0), frame="controller"))
     assert "force-in-model-base" not in said(by_force)
-
-
-def test_nothing_is_said_where_nothing_acts(by_force: Robot) -> None:
-    assert check_force([]) == []
-    assert check_force([(by_force, np.zeros((3, 6)))]) == []
-    pushed = by_force.with_wrench(SIDEWAYS)
-    assert check_force([(pushed, np.full((2, 6), np.nan))]) == []
-
-
-def test_a_robot_without_a_proof_bends_as_its_values_say(by_force: Robot) -> None:
-    told = said(replace(by_force, proof=None), Wrench((0.0, 5.0, 0.0)))
-    assert list(told) == ["force-taken"]
-    assert "known to" not in told["force-taken"].message

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.expecting import known, refused
 from tests.simulated import campaign
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
-from truearm.engine.base.errors import InputError, Notice
+from truearm.engine.base.errors import Notice
 from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.parts import Payload
@@ -27,6 +27,10 @@ from truearm.engine.robot.robot_file.writing import robot_text
 from truearm.engine.robot.transform import IDENTITY
 
 
+def proof_of(robot: Robot) -> Proof:
+    return known(robot.proof)
+
+
 @pytest.fixture(scope="module")
 def calibration() -> Calibration:
     return calibrate("irb120", campaign("irb120", 20, 2e-5, 1)[1], model="geometric", effects=["compliance"])
@@ -38,15 +42,8 @@ def read(text: str, tmp_path: Path) -> Robot:
     return read_robot(path)
 
 
-def refusal(text: str, tmp_path: Path) -> str:
-    with pytest.raises(InputError) as caught:
-        read(text, tmp_path)
-    return str(caught.value)
-
-
 def test_it_says_how_the_fit_ended_and_what_it_saw(calibration: Calibration) -> None:
-    proof = calibration.robot.proof
-    assert proof is not None
+    proof = proof_of(calibration.robot)
     assert proof.status == "converged"
     assert proof.names == calibration.fit.free.names
     training = calibration.data.joints[calibration.training]
@@ -57,27 +54,28 @@ def test_it_says_how_the_fit_ended_and_what_it_saw(calibration: Calibration) -> 
 def test_a_file_is_the_same_after_it_was_read(calibration: Calibration, tmp_path: Path) -> None:
     text = robot_text(calibration.robot)
     robot = read(text, tmp_path)
-    ours, theirs = robot.proof, calibration.robot.proof
-    assert ours is not None
-    assert theirs is not None
+    ours, theirs = proof_of(robot), proof_of(calibration.robot)
     assert replace(ours, region=(), joint_error=()) == replace(theirs, region=(), joint_error=())
     np.testing.assert_allclose(ours.region, theirs.region, rtol=5e-16)
     np.testing.assert_allclose(ours.joint_error, theirs.joint_error, rtol=5e-16)
     assert robot_text(robot) == text
     assert is_intact(robot)
     assert is_intact(calibration.robot)
+    # what spoke against it is kept
+    unlike = Notice("implausible", 'Signs of "joint 6": wrong.', "error")
+    doubted = replace(calibration, warnings=(*calibration.warnings, unlike)).robot
+    robot = read(robot_text(doubted), tmp_path)
+    assert (proof_of(robot).status, proof_of(robot).errors) == ("implausible", (unlike,))
+    assert is_intact(robot)
 
 
 def test_the_rounded_covariance_predicts_as_the_fit_does(calibration: Calibration) -> None:
     robot, fit = calibration.robot, calibration.fit
-    assert robot.proof is not None
     joints = robot.random_configurations(50, np.random.default_rng(0))
     J = robot.position_jacobian(robot.forward_kinematics(joints, "1"), joints, fit.free.names)
-    exact, kept = (np.einsum("pxn,pq,qxn->n", J, C, J) for C in (fit.covariance, robot.proof.covariance))
+    exact, kept = (np.einsum("pxn,pq,qxn->n", J, C, J) for C in (fit.covariance, proof_of(robot).covariance))
     np.testing.assert_allclose(kept, exact, rtol=1e-3)
-
-
-def test_a_covariance_without_full_rank_is_kept() -> None:
+    # and one without full rank is kept
     parameters = [Parameter.plain(name, "m", "geometry", 0.0, 1e-3) for name in "abc"]
     root = np.array([[1e-3], [-2e-4], [0.0]])
     proof = Proof.of("at-bound", [], [], np.zeros(0), parameters, root @ root.T)
@@ -85,40 +83,22 @@ def test_a_covariance_without_full_rank_is_kept() -> None:
     assert proof.deviations == (1e-3, 2e-4, 0.0)
 
 
-def test_what_spoke_against_it_is_kept(calibration: Calibration, tmp_path: Path) -> None:
-    unlike = Notice("implausible", 'Signs of "joint 6": wrong.', "error")
-    doubted = replace(calibration, warnings=(*calibration.warnings, unlike)).robot
-    robot = read(robot_text(doubted), tmp_path)
-    assert robot.proof is not None
-    assert robot.proof.status == "implausible"
-    assert robot.proof.errors == (unlike,)
-    assert is_intact(robot)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "about"),
-    [
+def test_it_is_about_what_moves_the_robot(calibration: Calibration, tmp_path: Path) -> None:
+    text = robot_text(calibration.robot.with_payload("1kg,0mm,0mm,50mm"))
+    convention = "convention: modified-hayati\n"
+    for old, new, about in (
         ("title: ", "title: my ", True),
         ("name: irb120", "name: cell_3", True),
         ("history:\n", "history:\n  - moved to cell 3\n", True),
         ("a: 270.0", "a: 270.1", False),
         ("status: converged", "status: at-bound", False),
         ("correlations:\n    - '1'", "correlations:\n    - '0.5'", False),
-        ("convention: modified-hayati\n", "convention: modified-hayati\ngravity: [0.0, 0.0, 9.81]\n", False),
+        (convention, f"{convention}gravity: [0.0, 0.0, 9.81]\n", False),
         ("payload:", "payload: {mass: 3.0, cog: [0.0, 0.0, 0.0]} #", False),
-    ],
-)
-def test_it_is_about_what_moves_the_robot(
-    calibration: Calibration, tmp_path: Path, old: str, new: str, about: bool
-) -> None:
-    text = robot_text(calibration.robot.with_payload("1kg,0mm,0mm,50mm"))
-    assert old in text
-    robot = read(text.replace(old, new, 1), tmp_path)
-    assert is_intact(robot) == arm_is_known(robot) == about
-
-
-def test_a_value_in_the_file_cannot_be_edited_unnoticed(calibration: Calibration, tmp_path: Path) -> None:
-    text = robot_text(calibration.robot)
+    ):
+        assert old in text
+        robot = read(text.replace(old, new, 1), tmp_path)
+        assert is_intact(robot) == arm_is_known(robot) == about, new
     line = next(line for line in text.splitlines() if line.strip().startswith("a_3: {unit: mm"))
     value = line.partition("value: ")[2].partition(",")[0]
     assert not is_intact(read(text.replace(line, line.replace(value, f"{float(value) + 1e-9:.12f}")), tmp_path))
@@ -134,7 +114,7 @@ def test_changed_copies(calibration: Calibration) -> None:
         robot.with_effects(["gain"]),
         robot.with_frames(IDENTITY, {"1": (0.0, 0.0, 0.1)}),
     ):
-        assert other.proof is not None
+        assert proof_of(other)
         assert not is_intact(other)
         assert not is_intact(other.with_payload("1kg,0mm,0mm,50mm"))
 
@@ -143,17 +123,13 @@ def test_a_robot_with_other_targets_is_written_so_that_it_can_be_read(calibratio
     other = calibration.robot.with_frames(IDENTITY, {"ball": (0.0, 0.0, 0.1)})
     text = robot_text(other)
     robot = read(text, tmp_path)
-    assert robot.proof is not None
-    assert (robot.proof.status, robot.proof.names) == ("converged", ())
+    assert (proof_of(robot).status, proof_of(robot).names) == ("converged", ())
     assert robot_text(robot) == text
     assert not is_intact(robot)
 
 
-def test_another_convention_has_other_parameters(calibration: Calibration) -> None:
+def test_another_convention_and_older_files_have_none(calibration: Calibration, tmp_path: Path) -> None:
     assert converted(calibration.robot, "zero-reference").proof is None
-
-
-def test_older_files_have_none(calibration: Calibration, tmp_path: Path) -> None:
     head, tail = robot_text(calibration.robot).split("proof:\n")
     robot = read(head + tail[tail.index("history:") :], tmp_path)
     assert robot.proof is None
@@ -162,52 +138,36 @@ def test_older_files_have_none(calibration: Calibration, tmp_path: Path) -> None
 
 
 def test_only_base_and_targets_found_anew(calibration: Calibration) -> None:
-    known = calibration.robot.proof
-    assert known is not None
-    before = sealed(calibration.robot, replace(known, status="rank-loss"))
+    before = sealed(calibration.robot, replace(proof_of(calibration.robot), status="rank-loss"))
     again = calibrate(before, campaign("irb120", 12, 2e-5, 1)[1], model="frames")
-    proof = again.robot.proof
-    assert again.status.value == "converged"
-    assert proof is not None
-    assert proof.status == "rank-loss"
+    proof = proof_of(again.robot)
+    assert (again.status.value, proof.status) == ("converged", "rank-loss")
     assert is_intact(again.robot)
-    assert before.proof is not None
-    was, now = (dict(zip(p.names, p.deviations, strict=True)) for p in (before.proof, proof))
+    was, now = (dict(zip(p.names, p.deviations, strict=True)) for p in (proof_of(before), proof))
     assert now["a_3"] == pytest.approx(was["a_3"], rel=1e-6)
     assert now["base_x"] != was["base_x"]
-    assert proof.region[0][0] <= before.proof.region[0][0]
-    edited = calibrate(before.with_values({"a_3": 0.2703}), again.data, model="frames").robot.proof
-    assert edited is not None
+    assert proof.region[0][0] <= proof_of(before).region[0][0]
+    edited = proof_of(calibrate(before.with_values({"a_3": 0.2703}), again.data, model="frames").robot)
     assert (edited.status, "a_3" in edited.names) == ("rank-loss", False)
-    anew = calibrate(before, campaign("irb120", 20, 2e-5, 1)[1], effects=["compliance"]).robot.proof
-    assert anew is not None
-    assert anew.status == "converged"
+    anew = calibrate(before, campaign("irb120", 20, 2e-5, 1)[1], effects=["compliance"])
+    assert proof_of(anew.robot).status == "converged"
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "parts"),
-    [
-        (
-            "    - '1'\n",
-            "    - one\n",
-            ["proof.correlations[1]", "numbers from -1 to 1", "got 'one'", "allowed: 1 number"],
-        ),
-        ("    - '1'\n", "", ["proof.correlations", "one row belongs here for each", "allowed: "]),
-        ("joint_error: [", "joint_error: [0.0, ", ["proof.joint_error", "one entry belongs here for each joint", "7"]),
-        ("deviations: {base_x:", "deviations: {base_q:", ["proof.deviations", "no such parameter", "got 'base_q'"]),
-        ("status: converged", "status: fine", ["proof.status", "converged"]),
-        ("sha256: ", "sha256: no", ["proof.sha256"]),
-        ("  region:", "  regions:", ["regions", "Did you mean region"]),
-    ],
-)
-def test_a_damaged_entry_is_refused(
-    calibration: Calibration, tmp_path: Path, old: str, new: str, parts: list[str]
-) -> None:
+def test_a_damaged_entry_is_refused(calibration: Calibration, tmp_path: Path) -> None:
     text = robot_text(calibration.robot)
-    assert old in text
-    message = refusal(text.replace(old, new, 1), tmp_path)
-    for part in ["calibrated.yaml", *parts]:
-        assert part in message
+    numbers = ("proof.correlations[1]", "numbers from -1 to 1", "got 'one'", "allowed: 1 number")
+    for old, new, parts in (
+        ("    - '1'\n", "    - one\n", numbers),
+        ("    - '1'\n", "", ("proof.correlations", "one row belongs here for each", "allowed: ")),
+        ("joint_error: [", "joint_error: [0.0, ", ("proof.joint_error", "one entry belongs here for each joint", "7")),
+        ("deviations: {base_x:", "deviations: {base_q:", ("proof.deviations", "no such parameter", "got 'base_q'")),
+        ("status: converged", "status: fine", ("proof.status", "converged")),
+        ("sha256: ", "sha256: no", ("proof.sha256",)),
+        ("  region:", "  regions:", ("regions", "Did you mean region")),
+    ):
+        assert old in text
+        message = refused(None, r"calibrated\.yaml", read, text.replace(old, new, 1), tmp_path)
+        assert all(part in message for part in parts), message
 
 
 # -- correlations of hundreds of parameters -------------------------------------------------------------------
@@ -219,18 +179,15 @@ def many(count: int) -> tuple[tuple[float, ...], ...]:
     return ((1.0,), (-1.0, 0.0), *map(tuple, rows[2:]))
 
 
-@pytest.mark.parametrize("count", [1, 60, 61, 130])
-def test_a_factor_of_any_size_is_read_as_it_was_written(count: int) -> None:
-    written = correlations_text(many(count)[:count])
-    assert isinstance(written, str) == (count > 60)
-    assert factor_from(written, count, "here", "") == many(count)[:count]
-    digits = [" ".join(f"{v:.7g}" for v in row) for row in many(count)[:count]]
-    assert factor_from(digits, count, "here", "") == many(count)[:count]
-    if isinstance(written, str):
-        assert len(written) < 0.5 * sum(map(len, digits))
-
-
-def test_a_factor_that_is_not_rounded_is_written_in_digits() -> None:
+def test_a_factor_of_any_size_is_read_as_it_was_written() -> None:
+    for count in (1, 60, 61, 130):
+        factor = many(count)[:count]
+        written = correlations_text(factor)
+        digits = [" ".join(f"{v:.7g}" for v in row) for row in factor]
+        assert factor_from(written, count, "here", "") == factor_from(digits, count, "here", "") == factor, count
+        assert isinstance(written, str) == (count > 60)
+        assert not isinstance(written, str) or len(written) < 0.5 * sum(map(len, digits))
+    # what is not rounded is written in digits
     factor = (*many(70)[:-1], (1.234567e-5,) * 70)
     assert factor_from(correlations_text(factor), 70, "here", "") == factor
 
@@ -247,23 +204,17 @@ def test_a_seal_holds_whichever_way_the_factor_is_written(
     assert len(short) < len(rows)
     for text in (rows, short):
         robot = read(text, tmp_path)
-        assert robot.proof is not None
-        assert calibration.robot.proof is not None
-        assert robot.proof.factor == calibration.robot.proof.factor
+        assert proof_of(robot).factor == proof_of(calibration.robot).factor
         assert is_intact(robot)
         assert is_intact(read(robot_text(robot), tmp_path))
 
 
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        (lambda text: text[:-4], "no text of correlations of so many parameters; got '5907 bytes'; allowed: 5910"),
-        (lambda text: f"{text[:-4]}???!", "got 'other signs than those of base64'"),
-        (lambda text: "/" * 8 + text[8:], "correlations are -1 to 1"),
-    ],
-)
-def test_a_damaged_text_of_correlations_is_refused(change: Callable[[str], str], told: str) -> None:
+def test_a_damaged_text_of_correlations_is_refused() -> None:
     text = correlations_text(many(61))
     assert isinstance(text, str)
-    with pytest.raises(InputError, match=re.escape(told)):
-        factor_from(change(text), 61, "robot.yaml, proof.correlations", "")
+    for damaged, told in (
+        (text[:-4], "no text of correlations of so many parameters; got '5907 bytes'; allowed: 5910"),
+        (f"{text[:-4]}???!", "got 'other signs than those of base64'"),
+        ("/" * 8 + text[8:], "correlations are -1 to 1"),
+    ):
+        refused(None, re.escape(told), factor_from, damaged, 61, "robot.yaml, proof.correlations", "")

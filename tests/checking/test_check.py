@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.commanding import Truearm
+from tests.expecting import known, refused
 from tests.simulated import campaign
 
 from truearm.calibration.calibrate import calibrate
 from truearm.checking.check import check
-from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.rigid_tool import rigid_suspects
 from truearm.engine.data.statistics import errors_of, without_table_motion
@@ -39,8 +40,7 @@ def with_all_references(folder: Path) -> Dataset:
 def with_good_references(folder: Path) -> Dataset:
     """The measured IRB 120 with its reference points where all of these are good."""
     data = with_all_references(folder)
-    points = data.references
-    assert points is not None
+    points = known(data.references)
     usual = [np.nanmedian(points.position[points.target == t], axis=0) for t in range(3)]
     off = np.linalg.norm(points.position - np.array(usual)[points.target], axis=1)
     bad = set(points.configuration[~(off < 1e-3)].tolist())
@@ -148,14 +148,8 @@ def joint_sign(data: Dataset, rng: np.random.Generator) -> Dataset:
 
 
 def duplicates(data: Dataset, rng: np.random.Generator) -> Dataset:
-    mine = data.configuration == rng.integers(data.configurations)
-    return replace(
-        data,
-        configuration=np.concatenate([data.configuration, data.configuration[mine]]),
-        target=np.concatenate([data.target, data.target[mine]]),
-        position=np.concatenate([data.position, data.position[mine]]),
-        sigma=None,
-    )
+    mine = np.flatnonzero(data.configuration == rng.integers(data.configurations))
+    return data.of_readings([*range(len(data.target)), *mine.tolist()])
 
 
 def beyond_limits(data: Dataset, rng: np.random.Generator) -> Dataset:
@@ -164,17 +158,10 @@ def beyond_limits(data: Dataset, rng: np.random.Generator) -> Dataset:
     return replace(data, joints=joints)
 
 
-CORRUPTIONS: list[Corruption] = [
-    missing,
-    outliers,
-    targets_swapped,
-    target_mistaken,
-    unit_length,
-    unit_angle,
-    joint_sign,
-    duplicates,
+CORRUPTIONS: tuple[Corruption, ...] = (
+    *(missing, outliers, targets_swapped, target_mistaken, unit_length, unit_angle, joint_sign, duplicates),
     beyond_limits,
-]
+)
 
 
 @pytest.mark.parametrize("corrupt", CORRUPTIONS, ids=lambda c: c.__name__)
@@ -184,62 +171,57 @@ def test_every_fault_is_found(clean: tuple[str, Dataset], corrupt: Corruption) -
         assert corrupt.__name__.replace("_", "-") in codes(corrupt(data, np.random.default_rng(seed)), robot), seed
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_exchanged_and_mistaken_targets_show_without_a_robot(measured: Dataset, seed: int) -> None:
-    for corrupt in (outliers, targets_swapped, target_mistaken):
-        corrupted = corrupt(measured, np.random.default_rng(seed))
-        assert codes(corrupted, None) == {corrupt.__name__.replace("_", "-")}
+def test_exchanged_and_mistaken_targets_show_without_a_robot(measured: Dataset) -> None:
+    for seed in SEEDS:
+        for corrupt in (outliers, targets_swapped, target_mistaken):
+            corrupted = corrupt(measured, np.random.default_rng(seed))
+            assert codes(corrupted, None) == {corrupt.__name__.replace("_", "-")}, seed
+        rng = np.random.default_rng(seed)
+        first, second = two_targets(measured, np.random.default_rng(seed))
+        (notice,) = check(target_mistaken(measured, rng)).warnings
+        label = measured.labels[measured.configuration[first]]
+        names = [measured.targets[measured.target[r]] for r in (first, second)]
+        assert f"{label}/{names[0]} (is target {names[1]})" in notice.message
+        assert "Leave these cells empty" in notice.message
 
 
 @pytest.mark.parametrize("side", [(0.1, 0.1, 0.1), (0.1, 0.1, 0.1002), (0.1, 0.1, 0.13)])
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_reading_that_is_off_is_no_exchange_of_targets(side: tuple[float, float, float], seed: int) -> None:
-    rng, (a, b, c) = np.random.default_rng(seed), side
-    along = (a**2 + c**2 - b**2) / (2 * c)
-    tool = np.array([[0.0, 0, 0], [c, 0, 0], [along, np.sqrt(a**2 - along**2), 0]])
-    position = np.tile(tool, (20, 1)) + rng.normal(0.0, 2e-5, (60, 3))
-    wrong = rng.choice(20, 6, replace=False)
-    outward = (tool - tool.mean(axis=0)) / np.linalg.norm(tool - tool.mean(axis=0), axis=1, keepdims=True)
-    at = rng.integers(3, size=6)
-    position[3 * wrong + at] += 1e-3 * outward[at]
-    data = Dataset(
-        source="tool",
-        labels=tuple(map(str, range(20))),
-        joints=rng.uniform(-1.0, 1.0, (20, 6)),
-        joint_kinds=("revolute",) * 6,
-        targets=("1", "2", "3"),
-        configuration=np.repeat(np.arange(20), 3),
-        target=np.tile(np.arange(3), 20),
-        position=position,
-    )
-    found = {(s.rule.code, s.configuration, s.target) for s in rigid_suspects(data)}
-    assert found == {("outliers", str(c), str(t + 1)) for c, t in zip(wrong, at, strict=True)}
+def test_a_reading_that_is_off_is_no_exchange_of_targets(side: tuple[float, float, float]) -> None:
+    for seed in SEEDS:
+        rng, (a, b, c) = np.random.default_rng(seed), side
+        along = (a**2 + c**2 - b**2) / (2 * c)
+        tool = np.array([[0.0, 0, 0], [c, 0, 0], [along, np.sqrt(a**2 - along**2), 0]])
+        position = np.tile(tool, (20, 1, 1)) + rng.normal(0.0, 2e-5, (20, 3, 3))
+        wrong = rng.choice(20, 6, replace=False)
+        outward = (tool - tool.mean(axis=0)) / np.linalg.norm(tool - tool.mean(axis=0), axis=1, keepdims=True)
+        at = rng.integers(3, size=6)
+        position[wrong, at] += 1e-3 * outward[at]
+        data = Dataset.of(rng.uniform(-1.0, 1.0, (20, 6)), position)
+        found = {(s.rule.code, s.configuration, s.target) for s in rigid_suspects(data)}
+        assert found == {("outliers", str(c + 1), str(t + 1)) for c, t in zip(wrong, at, strict=True)}, seed
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_reading_is_named(measured: Dataset, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    first, second = two_targets(measured, np.random.default_rng(seed))
-    (notice,) = check(target_mistaken(measured, rng)).warnings
-    label = measured.labels[measured.configuration[first]]
-    names = [measured.targets[measured.target[r]] for r in (first, second)]
-    assert f"{label}/{names[0]} (is target {names[1]})" in notice.message
-    assert "Leave these cells empty" in notice.message
+def test_of_many_targets_the_wrong_one_is_named() -> None:
+    rng = np.random.default_rng(4)
+    tool = rng.uniform(-0.3, 0.3, (40, 3))
+    position = np.tile(tool, (12, 1, 1)) + rng.normal(0, 1e-5, (12, 40, 3))
+    position[5, 17] += 0.004
+    (suspect,) = rigid_suspects(Dataset.of(np.zeros((12, 6)), position))
+    assert (suspect.rule.code, suspect.configuration, suspect.target) == ("outliers", "6", "18")
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("points", [1, 3])
-def test_a_moved_table_shows(measured: Dataset, seed: int, points: int) -> None:
-    rng = np.random.default_rng(seed)
-    references = measured.references
-    assert references is not None
-    direction = rng.normal(size=3)
-    shift = 1e-3 * direction / np.linalg.norm(direction)
-    later = references.configuration >= rng.integers(50, measured.configurations - 50)
-    moved = later & (references.target < points)
-    position = references.position + np.where(moved[:, None], shift, 0.0)
-    corrupted = replace(measured, references=replace(references, position=position))
-    assert codes(corrupted, None) == {"reference-moved"}
+def test_a_moved_table_shows(measured: Dataset, points: int) -> None:
+    references = known(measured.references)
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        direction = rng.normal(size=3)
+        shift = 1e-3 * direction / np.linalg.norm(direction)
+        later = references.configuration >= rng.integers(50, measured.configurations - 50)
+        moved = later & (references.target < points)
+        position = references.position + np.where(moved[:, None], shift, 0.0)
+        corrupted = replace(measured, references=replace(references, position=position))
+        assert codes(corrupted, None) == {"reference-moved"}, seed
 
 
 def test_the_mistaken_reference_readings_are_named(with_references: Dataset) -> None:
@@ -290,8 +272,8 @@ def test_joints_read_before_settling_show(measured_data: Path) -> None:
     for name in ("commanded", "read"):
         data, _ = read_matrices(folder / f"joints_{name}.txt", targets, {}, "deg", "mm")
         run = calibrate("irb120", data, train=300)
-        assert run.validation is not None
-        found[name] = (run.validation.position_norms.mean() * 1e3, {n.code: n.message for n in run.warnings})
+        mean = known(run.validation).position_norms.mean() * 1e3
+        found[name] = (mean, {n.code: n.message for n in run.warnings})
     assert "joints-not-settled" not in found["commanded"][1]
     mean, notices = found["read"]
     assert mean <= 0.50
@@ -299,16 +281,16 @@ def test_joints_read_before_settling_show(measured_data: Path) -> None:
     assert "hysteresis" in notices["joints-not-settled"]
 
 
-@pytest.mark.parametrize("robot", ["ur5", "kr5", "puma560"])
-def test_hysteresis_of_a_simulated_robot_shows(robot: str) -> None:
-    rng = np.random.default_rng(4)
-    twin, data = campaign(robot, 80, 0.05e-3, 4)
-    lag = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1])) * np.radians(0.01)
-    true = twin.robot
-    position = np.stack([true.world_poses(data.joints + lag, t)[0] for t in data.targets], axis=1).reshape(-1, 3)
-    late = replace(data, position=position + rng.normal(0.0, 0.05e-3, position.shape))
-    assert "joints-not-settled" in {n.code for n in calibrate(robot, late).warnings}
-    assert "joints-not-settled" not in {n.code for n in calibrate(robot, data).warnings}
+def test_hysteresis_of_a_simulated_robot_shows() -> None:
+    for robot in ("ur5", "kr5", "puma560"):
+        rng = np.random.default_rng(4)
+        twin, data = campaign(robot, 80, 0.05e-3, 4)
+        lag = np.sign(np.diff(data.joints, axis=0, prepend=data.joints[:1])) * np.radians(0.01)
+        places = [twin.robot.world_poses(data.joints + lag, target)[0] for target in data.targets]
+        position = np.stack(places, axis=1).reshape(-1, 3)
+        late = replace(data, position=position + rng.normal(0.0, 0.05e-3, position.shape))
+        assert "joints-not-settled" in {n.code for n in calibrate(robot, late).warnings}, robot
+        assert "joints-not-settled" not in {n.code for n in calibrate(robot, data).warnings}, robot
 
 
 def test_one_target_a_configuration_is_a_campaign() -> None:
@@ -347,15 +329,19 @@ def test_messages_count_in_words() -> None:
     elsewhere = data.position[5] - data.position[4]
     (wrong,) = told(moved_readings(data, np.array([4]), elsewhere))
     assert wrong.startswith("1 reading was taken from another point than it names (configuration/target): 2/")
-    again = np.append(np.arange(30), 4)
-    copied = replace(
-        data,
-        configuration=data.configuration[again],
-        target=data.target[again],
-        position=data.position[again],
-        sigma=None,
-    )
-    (repeated,) = told(copied)
+    (repeated,) = told(data.of_readings([*range(30), 4]))
     assert repeated.startswith("1 reading repeats another one to the last digit (target at configurations): 2 at 2 and")
-    with pytest.raises(InputError, match="got '1 joint column'; allowed: 6"):
-        told(replace(data, joints=data.joints[:, :1], joint_kinds=("revolute",), approach=None), "irb120")
+    single = replace(data, joints=data.joints[:, :1], joint_kinds=("revolute",), approach=None)
+    refused(None, "got '1 joint column'; allowed: 6", check, "irb120", single)
+
+
+def test_the_old_order_of_robot_and_data_is_refused_with_the_new_line(
+    truearm: Truearm, small: Path, tmp_path: Path
+) -> None:
+    done = truearm("check", small / "data.csv", "irb120")
+    assert done.code == 2
+    assert f"Write 'truearm check irb120 {small / 'data.csv'}'." in done.err
+    assert truearm("check", "irb120", small / "data.csv").code == 0
+    refused(None, r"this is a robot.*Exchange robot and measurements", calibrate, "irb120", "irb120")
+    (tmp_path / "arm.yaml").write_text("# an arm\ntruearm: truearm-robot/1\n")
+    refused(None, "this is a robot", check, tmp_path / "arm.yaml")

@@ -19,7 +19,6 @@ from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Tool
-from truearm.engine.robot.transform import quaternion_from_rotation
 from truearm.engine.twin.truths import at_station
 from truearm.engine.twin.twin import Twin, measure
 
@@ -119,22 +118,18 @@ def in_metres_with_a_sign(data: Dataset) -> Dataset:
     return sign_of(4)(scaled(1e3)(data))
 
 
-@pytest.mark.parametrize(
-    ("spoil", "told"),
-    [
+def test_units_of_positions_are_named_by_what_fits() -> None:
+    for spoil, told in (
         (of_some(1e3, 0.4), ["are a thousand times too large, as if mm were called m; those of the others are not"]),
         (of_some(1e-3, 0.4), ["are a thousand times too small, as if m were called mm; those of the others are not"]),
         (of_some(25.4, 0.1), ["are 25.4 times too large, as if mm were called inches; those"]),
         (single_cells, ["No one unit makes them fit"]),
         (in_metres_with_a_sign, ["are a thousand times too large, as if mm were called m", "The sign of joint 4 is"]),
-    ],
-)
-def test_units_of_positions_are_named_by_what_fits(spoil: Callable[[Dataset], Dataset], told: list[str]) -> None:
-    errors = [notice for notice in check(ROBOT, spoil(honest())).warnings if notice.level == "error"]
-    assert errors[0].code == "unit-length"
-    assert len(errors) == len(told)
-    for notice, words in zip(errors, told, strict=True):
-        assert words in notice.message
+    ):
+        errors = [notice for notice in check(ROBOT, spoil(honest())).warnings if notice.level == "error"]
+        assert errors[0].code == "unit-length"
+        for notice, words in zip(errors, told, strict=True):
+            assert words in notice.message
 
 
 def rows_of(data: Dataset, first: int, last: int, factor: float, target: int | None = None) -> tuple[Dataset, set[str]]:
@@ -147,26 +142,20 @@ def rows_of(data: Dataset, first: int, last: int, factor: float, target: int | N
 
 
 @pytest.mark.parametrize("of_one", [False, True])
-@pytest.mark.parametrize(
-    ("first", "last", "factor", "said"),
-    [
+def test_rows_in_another_unit_of_length_are_all_named_and_nothing_else_is_said_of_them(of_one: bool) -> None:
+    for first, last, factor, said in (
         (5, 5, 1e-3, "at configuration 5 are a thousand times too small"),
         (5, 10, 1e-3, "at configurations 5 to 10 are a thousand times too small"),
         (1, 19, 1e-3, "at configurations 1 to 19 are a thousand times too small"),
         (9, 10, 1e3, "at configurations 9, 10 are a thousand times too large"),
         (20, 24, 1 / 25.4, "at configurations 20 to 24 are 25.4 times too small, as if inches"),
-    ],
-)
-def test_rows_in_another_unit_of_length_are_all_named_and_nothing_else_is_said_of_them(
-    of_one: bool, first: int, last: int, factor: float, said: str
-) -> None:
-    data, rows = rows_of(one_target_of(honest()) if of_one else honest(), first, last, factor)
-    run = check(ROBOT, data)
-    (notice,) = run.warnings
-    assert (notice.code, notice.level) == ("unit-length", "error")
-    assert said in notice.message
-    assert {"/".join(where) for where in notice.at} == rows
-    assert [step.code for step in run.next] == ["mend-data"]
+    ):
+        data, rows = rows_of(one_target_of(honest()) if of_one else honest(), first, last, factor)
+        run = check(ROBOT, data)
+        (notice,) = run.warnings
+        assert (notice.code, notice.level, said in notice.message) == ("unit-length", "error", True), notice.message
+        assert {"/".join(where) for where in notice.at} == rows, said
+        assert [step.code for step in run.next] == ["mend-data"], said
 
 
 def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
@@ -177,9 +166,7 @@ def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
     assert {"/".join(where) for where in notice.at} == rows
     (notice,) = check(None, rows_of(honest(), 1, 19, 1 / 25.4)[0]).warnings
     assert "lie 25.4 times farther apart at configurations 20 to 24 than at the others" in notice.message
-
-
-def test_two_rows_in_metres_of_a_long_campaign_are_named_and_each_reading_alone() -> None:
+    # two rows of a long campaign are named, and a reading alone
     long = replace(campaign(ROBOT, 80, 0.05e-3, 5)[1], sigma=None)
     data, rows = rows_of(long, 41, 42, 1e-3)
     (notice,) = check(ROBOT, data).warnings
@@ -190,11 +177,11 @@ def test_two_rows_in_metres_of_a_long_campaign_are_named_and_each_reading_alone(
     assert {"/".join(where) for where in notice.at} == rows | more
 
 
-@pytest.mark.parametrize(("robot", "poses"), [("irb120", 30), ("ur10", 12), ("katana450", 30), ("li3", 20)])
-def test_honest_data_have_no_error(robot: str, poses: int) -> None:
-    run = calibrate(robot, campaign(robot, poses, 0.05e-3, 8)[1])
-    assert run.finished
-    assert not [n for n in run.warnings if n.level == "error"]
+def test_honest_data_have_no_error() -> None:
+    for robot, poses in (("irb120", 30), ("ur10", 12), ("katana450", 30), ("li3", 20)):
+        run = calibrate(robot, campaign(robot, poses, 0.05e-3, 8)[1])
+        assert run.finished, robot
+        assert not [n for n in run.warnings if n.level == "error"], robot
 
 
 def test_an_unmastered_robot_is_the_robot() -> None:
@@ -206,39 +193,20 @@ def test_an_unmastered_robot_is_the_robot() -> None:
     assert "enter wider priors" in next(n.message for n in run.warnings if n.code == "far-from-nominal")
 
 
-@pytest.mark.parametrize("offset", [0.5e-3, 5e-3])
-def test_the_sign_of_the_last_joint_is_named_for_a_target_near_its_axis(offset: float) -> None:
+def test_the_sign_of_the_last_joint_is_named_for_a_target_near_its_axis() -> None:
     nominal, rng = load_robot(ROBOT), np.random.default_rng(2)
     drawn = {
         p.name: p.value + p.prior * float(rng.standard_normal())
         for p in nominal.parameters.values()
         if p.group in ("geometry", "joint zero")
     }
-    tool = Tool({"A": (offset, 0.0, 0.1)})
-    twin = Twin(at_station(nominal.with_values(drawn), tool), {})
-    data = replace(measure(twin, nominal.random_configurations(40, rng), 0.02e-3, rng), sigma=None)
-    assert not check(ROBOT, data).warnings
-    (notice,) = check(ROBOT, sign_of(6)(data)).warnings
-    assert (notice.code, notice.level) == ("joint-sign", "error")
-    assert notice.message.startswith("The sign of joint 6 is opposite")
-
-
-def with_orientations(order: list[int]) -> Dataset:
-    twin, data = campaign(ROBOT, 25, 0.0, 5)
-    _, R = twin.robot.world_poses(data.joints)
-    quaternion = quaternion_from_rotation(R[data.configuration])[:, order]
-    return replace(data, quaternion=quaternion, sigma=None)
-
-
-def test_quaternions_in_another_order_are_told() -> None:
-    right = with_orientations([0, 1, 2, 3])
-    assert "quaternion-order" not in {n.code for n in check(ROBOT, right).warnings}
-    found = {n.code: n for n in check(ROBOT, with_orientations([1, 2, 3, 0])).warnings}
-    assert found["quaternion-order"].level == "error"
-    assert "in the order x, y, z, w" in found["quaternion-order"].message
-    inverse = replace(right, quaternion=np.asarray(right.quaternion) * [1.0, -1.0, -1.0, -1.0])
-    told = next(n.message for n in check(ROBOT, inverse).warnings if n.code == "quaternion-order")
-    assert "turn the other way round" in told
+    for offset in (0.5e-3, 5e-3):
+        twin = Twin(at_station(nominal.with_values(drawn), Tool({"A": (offset, 0.0, 0.1)})), {})
+        data = replace(measure(twin, nominal.random_configurations(40, rng), 0.02e-3, rng), sigma=None)
+        assert not check(ROBOT, data).warnings, offset
+        (notice,) = check(ROBOT, sign_of(6)(data)).warnings
+        assert (notice.code, notice.level) == ("joint-sign", "error"), offset
+        assert notice.message.startswith("The sign of joint 6 is opposite"), offset
 
 
 def test_joint_positions_of_another_row_are_told() -> None:
@@ -269,51 +237,41 @@ def test_joint_positions_that_belong_to_no_row_are_told_and_not_their_readings()
     assert notice.message.startswith("1 reading is far from where it must be (configuration/target): 5/1 (")
 
 
+def test_a_robot_is_not_another_one_because_of_one_wrong_row() -> None:
+    joints = honest().joints.copy()
+    joints[3, 2] += 0.2
+    found = {n.code for n in calibrate(ROBOT, replace(honest(), joints=joints)).warnings}
+    assert ("joints-mistaken" in found, "wrong-robot" in found) == (True, False)
+
+
 def one_target_of(data: Dataset) -> Dataset:
     return replace(data.of_readings(data.target == 0), targets=data.targets[:1])
 
 
-@pytest.mark.parametrize("of_one", [False, True])
-def test_rows_in_another_unit_of_angle_are_told(of_one: bool) -> None:
-    data = one_target_of(honest()) if of_one else honest()
-    joints = data.joints.copy()
-    joints[[2, 6]] *= np.pi / 180
-    (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
-    assert (notice.code, notice.level) == ("unit-angle", "error")
-    assert "radians are called deg, at some configurations alone (3, 7)" in notice.message
+def test_rows_in_another_unit_of_angle_are_told() -> None:
+    for data in (honest(), one_target_of(honest())):
+        joints = data.joints.copy()
+        joints[[2, 6]] *= np.pi / 180
+        (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
+        assert (notice.code, notice.level) == ("unit-angle", "error")
+        assert "radians are called deg, at some configurations alone (3, 7)" in notice.message
 
 
-@pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
 @pytest.mark.parametrize(
     ("units", "words"), [(np.radians, "radians are called deg"), (np.degrees, "degrees are called rad")]
 )
-def test_a_block_of_rows_in_another_unit_of_angle_is_told(
-    share: float, units: Callable[[Array], Array], words: str
+def test_blocks_of_rows_and_all_rows_in_another_unit_of_angle_are_told(
+    units: Callable[[Array], Array], words: str
 ) -> None:
     data = honest()
-    joints, some = data.joints.copy(), round(share * data.configurations)
-    joints[:some] = units(joints[:some])
-    (told,) = [n for n in check(ROBOT, replace(data, joints=joints)).warnings if n.level == "error"]
-    assert told.code == "unit-angle"
-    assert f"{words}, at some configurations alone (1, 2" in told.message
-
-
-@pytest.mark.parametrize(
-    ("units", "words"), [(np.radians, "radians are called deg"), (np.degrees, "degrees are called rad")]
-)
-def test_all_rows_in_another_unit_of_angle_are_told(units: Callable[[Array], Array], words: str) -> None:
-    data = honest()
-    told = check(ROBOT, replace(data, joints=units(data.joints))).warnings
-    assert any(n.message == f"The joints: {words}. Mend the unit in the header." for n in told)
-
-
-def test_a_robot_is_not_another_one_because_of_one_wrong_row() -> None:
-    data = honest()
-    joints = data.joints.copy()
-    joints[3, 2] += 0.2
-    codes = {n.code for n in calibrate(ROBOT, replace(data, joints=joints)).warnings}
-    assert "joints-mistaken" in codes
-    assert "wrong-robot" not in codes
+    for share in (0.3, 0.5, 0.8):
+        joints, some = data.joints.copy(), round(share * data.configurations)
+        joints[:some] = units(joints[:some])
+        (told,) = [n for n in check(ROBOT, replace(data, joints=joints)).warnings if n.level == "error"]
+        assert told.code == "unit-angle", share
+        assert f"{words}, at some configurations alone (1, 2" in told.message, share
+    every = check(ROBOT, replace(data, joints=units(data.joints))).warnings
+    assert any(n.message == f"The joints: {words}. Mend the unit in the header." for n in every)
 
 
 def test_a_reading_far_off_is_blamed_once_and_no_good_one_with_it() -> None:

@@ -1,19 +1,371 @@
-"""All that a fleet says: which robots to look at first, and figures that count each machine once."""
+"""What a fleet says: quantiles of errors, spread, robots that differ or drift, and which to look at first.
+
+Truth is the distribution that errors and robots are drawn from: what is there is found, and chance is not taken for it.
+"""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from datetime import date
+from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.fleets.simulated_series import campaign, rows
+from tests.expecting import known
+from tests.fleets.simulated_series import Calibrations, calibrations, campaign, kind_of, rows
 
 from truearm.engine.document.document import held_by, lines_of
-from truearm.fleets.analysis import Analysis, analysed
+from truearm.engine.robot.chain import Array
+from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.reading import read_robot
+from truearm.engine.robot.robot_file.writing import robot_text
+from truearm.fleets.analysis import Analysis, ParameterSpread, analysed, differences, spreads, with_proposed
+from truearm.fleets.drift import MONTH, Drifts, drifts, quantiles, share_interval
+from truearm.fleets.figures import fleet_figures
 from truearm.fleets.series import Accuracy, FoundParameters, Row
 from truearm.fleets.words import analysis_blocks, analysis_notices
 
-COUNT = len(campaign().own)
+NAMES = campaign().names
+COUNT = len(NAMES)
+
+
+def drawn(robots: int, rng: np.random.Generator, size: float = 1.0, **off: float) -> Array:
+    """Return true differences in priors `(robots, parameters)`; some are larger by so much in the second robot."""
+    truth = size * rng.standard_normal((robots, COUNT))
+    for name, more in off.items():
+        truth[1, NAMES.index(name)] += more
+    return truth
+
+
+def changing(**rates: float) -> Array:
+    """Return changes in priors a month."""
+    made = np.zeros(COUNT)
+    for name, rate in rates.items():
+        made[NAMES.index(name)] = rate
+    return made
+
+
+# -- quantiles ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("robots", "share"), [(20, 0.5), (100, 0.9), (100, 0.95)])
+def test_the_interval_of_a_quantile_covers_it_in_95_of_100_series(robots: int, share: float) -> None:
+    rng = np.random.default_rng(1)
+    truth = -np.log(1.0 - share)  # of the exponential distribution
+    covered = 0
+    for _ in range(400):
+        (found,) = quantiles(rng.exponential(size=robots), (share,))
+        assert known(found.low) <= known(found.value) <= known(found.high)
+        covered += known(found.low) <= truth <= known(found.high)
+    assert covered >= 400 * 0.93
+
+
+def test_what_few_robots_cannot_tell_is_not_told() -> None:
+    median, ninety, *_ = quantiles(np.array([1.0, 2.0, 3.0]))
+    assert (median.value, median.low, median.high) == (2.0, None, None)
+    assert (ninety.value, ninety.needed) == (None, 36)
+    for share in (0.5, 0.9, 0.95):
+        needed = quantiles(np.arange(3.0), (share,))[0].needed
+        for robots, told in ((needed, True), (needed - 1, False)):
+            (found,) = quantiles(np.arange(float(robots)), (share,))
+            assert (found.low is not None and found.high is not None) == told
+
+
+def test_the_share_of_robots_that_fail() -> None:
+    for count, of, low, high in ((0, 10, 0.0, 0.3085), (10, 10, 0.6915, 1.0), (1, 20, 0.0013, 0.2487)):
+        assert share_interval(count, of) == pytest.approx((low, high), abs=1e-4)  # Clopper and Pearson's tables
+
+
+# -- spread ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("robots", "noise"), [(12, 3e-5), (40, 3e-4)])
+def test_intervals_cover_the_true_spread_and_mean(robots: int, noise: float) -> None:
+    rng = np.random.default_rng(1)
+    scale = np.where(np.arange(COUNT) % 2, 0.5, 1.5)
+    how = calibrations(campaign(20, 1), noise)
+    spread, mean = [], []
+    for _ in range(40):
+        kind = kind_of(rows(rng.standard_normal((robots, COUNT)) * scale, rng, how))
+        for one, factor in zip(spreads(kind), scale, strict=True):
+            if one.low is not None and one.high is not None and one.mean_low is not None and one.mean_high is not None:
+                spread.append(one.low <= factor * one.prior <= one.high)
+                mean.append(one.mean_low <= 0.0 <= one.mean_high)
+    assert len(spread) > 40 * 12
+    assert 0.92 <= np.mean(spread) <= 0.98
+    assert 0.92 <= np.mean(mean) <= 0.98
+
+
+def test_what_the_estimates_are_uncertain_by_is_taken_off() -> None:
+    rng = np.random.default_rng(2)
+    how = calibrations(campaign(20, 1), 2e-4)
+    kind = kind_of(rows(0.1 * rng.standard_normal((300, COUNT)), rng, how))
+    number = kind.parameters.index("alpha_6")
+    one = spreads(kind)[number]
+    raw = np.std(kind.difference[:, number])
+    assert raw > 1.5 * 0.1 * one.prior
+    assert known(one.low) <= 0.1 * one.prior <= known(one.high)
+    assert one.verdict == "narrower"
+
+
+def test_verdicts_and_what_is_not_told() -> None:
+    rng = np.random.default_rng(3)
+    scale = np.ones(COUNT)
+    scale[NAMES.index("a_3")], scale[NAMES.index("alpha_3")] = 3.0, 0.2
+    kind = kind_of(rows(rng.standard_normal((60, COUNT)) * scale, rng))
+    told = {one.parameter: one for one in spreads(kind)}
+    verdicts = {"a_3": "wider", "alpha_3": "narrower", "d_2": "shared", "d_3": "shared", "theta_offset_1": "prior only"}
+    assert {name: told[name].verdict for name in verdicts} == verdicts
+    assert told["theta_offset_1"].proposed is None
+    few = kind_of(rows(rng.standard_normal((9, COUNT)), rng))
+    assert {one.verdict for one in spreads(few)} == {"too few", "shared", "prior only"}
+
+
+def test_a_robot_with_a_fault_does_not_widen_the_priors() -> None:
+    rng = np.random.default_rng(4)
+    place = NAMES.index("theta_offset_3")
+    kind = kind_of(rows(drawn(30, rng, theta_offset_3=12.0), rng))
+    faulty = {one.robot for one in differences(kind)}
+    assert faulty == {"robot-2"}
+    assert spreads(kind)[place].verdict == "wider"
+    assert spreads(kind, faulty)[place].verdict == "agrees"
+
+
+def test_proposed_priors_are_a_robot_file_that_can_be_read(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    truth = drawn(60, rng)
+    truth[:, NAMES.index("a_3")] = 2.0 + 0.3 * truth[:, NAMES.index("a_3")]  # all robots are 2 mm longer
+    told = spreads(kind_of(rows(truth, rng)))
+    nominal = load_robot("irb120")
+    made, proposed = with_proposed(nominal, told)
+    assert "d_2" not in proposed
+    shifted = made.parameters["a_3"]
+    assert shifted.nominal == shifted.value == pytest.approx(nominal.values["a_3"] + 2e-3, abs=2e-4)
+    assert shifted.prior == pytest.approx(3e-4, rel=0.3)
+    assert made.parameters["d_4"].nominal == nominal.values["d_4"]
+    (tmp_path / "priors.yaml").write_text(robot_text(made), "utf-8")
+    again = read_robot(tmp_path / "priors.yaml")
+    assert "a_3" in proposed
+    for name in proposed:
+        assert again.parameters[name].prior == pytest.approx(made.parameters[name].prior, rel=1e-12)
+    assert "from the spread of 60 robots" in again.source
+    made, proposed = with_proposed(nominal, spreads(kind_of(rows(drawn(5, rng), rng))))
+    assert (bool(proposed), made) == (False, nominal)  # of too few robots
+    # no prior is proposed where values scatter less than they are uncertain by
+    found = ParameterSpread("a_2", "m", 0.0, 1e-3, 1.0, 12, "narrower", spread=0.0, low=0.0, high=0.0)
+    assert found.proposed is None
+
+
+# -- robots that differ ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robots", [4, 12, 40])
+def test_few_series_without_a_fault_name_a_robot(robots: int) -> None:
+    rng = np.random.default_rng(robots)
+    trials = 60
+    alarms = sum(bool(differences(kind_of(rows(drawn(robots, rng), rng)))) for _ in range(trials))
+    assert alarms <= 7  # 3 are promised at most; chance gives 8 of 60 in 1 of 100 runs
+
+
+@pytest.mark.parametrize("robots", [3, 12, 60])
+def test_a_slipped_zero_is_found_in_its_joint(robots: int) -> None:
+    rng = np.random.default_rng(3)
+    truth = 0.5 * drawn(robots, rng)
+    truth[1, NAMES.index("theta_offset_3")] += 10.0  # a degree, where the prior is 0.1
+    first, *_ = differences(kind_of(rows(truth, rng)))
+    assert (first.robot, first.parameter, first.alone) == ("robot-2", "theta_offset_3", True)
+    assert first.off == pytest.approx(np.radians(1.0), abs=np.radians(0.15))
+    assert first.beside == ("prior" if robots < 10 else "series")
+
+
+def test_a_link_that_only_a_sum_shows_is_told_with_its_partner() -> None:
+    rng = np.random.default_rng(4)
+    found = {one.parameter: one for one in differences(kind_of(rows(drawn(20, rng, 0.3, d_3=6.0), rng)))}
+    assert {"d_2", "d_3"} <= set(found)
+    assert not found["d_3"].alone
+    assert found["d_3"].together == ("d_2",)
+    assert found["d_3"].off == pytest.approx(6e-3, abs=1.5e-3)  # of the sum
+    # what only priors hold is not compared: the base turns as well
+    assert not differences(kind_of(rows(drawn(20, rng, 0.3, theta_offset_1=30.0), rng)))
+
+
+def test_a_robot_that_was_measured_badly_is_not_taken_for_another() -> None:
+    rng = np.random.default_rng(6)
+    poor = calibrations(campaign(8, 3), 3e-4)
+    alarms = 0
+    for _ in range(60):
+        truth = 0.05 * rng.standard_normal((16, COUNT))  # less than the poor campaign's own uncertainty
+        alarms += bool(differences(kind_of([*rows(truth[:15], rng), *rows(truth[15:], rng, poor, names=["poor"])])))
+    assert alarms <= 7
+
+
+def test_parameters_whose_nominal_values_differ_or_that_few_robots_identified_are_not_compared() -> None:
+    rng = np.random.default_rng(7)
+    told = rows(rng.standard_normal((12, COUNT)), rng)
+    one = told[3].parameters["a_3"]
+    others = {**told[3].parameters, "a_3": replace(one, nominal=one.nominal + 0.05)}
+    told[3] = replace(told[3], parameters=FoundParameters.of(others))
+    kind = kind_of(told)
+    assert np.isnan(kind.prior[kind.parameters.index("a_3")])
+    assert not [each for each in differences(kind) if each.parameter == "a_3"]
+    rng = np.random.default_rng(11)
+    told = rows(rng.standard_normal((20, COUNT)), rng)
+    for number in range(4, 20):
+        kept = {name: one for name, one in told[number].parameters.items() if name != "a_3"}
+        told[number] = replace(told[number], parameters=FoundParameters.of(kept), covariance=())
+    wrong = {**told[0].parameters, "a_3": replace(told[0].parameters["a_3"], value=9.0)}
+    told[0] = replace(told[0], parameters=FoundParameters.of(wrong))
+    assert not [one for one in differences(kind_of(told)) if one.parameter == "a_3"]
+
+
+# -- machines that were measured again ---------------------------------------------------------------------
+
+
+def campaigns(
+    truth: Array,
+    months: tuple[int, ...],
+    rng: np.random.Generator,
+    hows: tuple[Calibrations, ...],
+    rate: Array | None = None,
+    *,
+    correlated: bool = True,
+) -> Drifts:
+    """Measure machines with true differences ``(machines, parameters)`` in some months, with a change a month."""
+    told: list[Row] = []
+    for machine in range(len(truth)):
+        for month, how in zip(months, hows, strict=True):
+            days = date(2026, month + 1, 1).toordinal() - date(2026, months[0] + 1, 1).toordinal()
+            there = truth[machine] + (0.0 if rate is None else rate * days / MONTH)
+            told += rows(
+                there[None],
+                rng,
+                how,
+                names=[f"m{machine}-{month}"],
+                of=f"m{machine}",
+                date=f"2026-{month + 1:02d}-01",
+                correlated=correlated,
+            )
+    return drifts(kind_of(told))
+
+
+STRONG, OTHER, POOR = calibrations(campaign()), calibrations(campaign(30, 1)), calibrations(campaign(8, 3), 3e-4)
+
+
+@pytest.mark.parametrize("hows", [(STRONG, OTHER), (STRONG, POOR)], ids=["alike", "one of them poor"])
+def test_few_fleets_without_a_change_tell_one(hows: tuple[Calibrations, ...]) -> None:
+    rng = np.random.default_rng(1)
+    times: dict[str, list[float]] = {}
+    alarms = 0
+    for _ in range(25):
+        found = campaigns(rng.standard_normal((4, COUNT)), (0, 6), rng, hows)
+        alarms += bool(found.significant)
+        for one in found.found:
+            times.setdefault(one.parameter, []).append(one.times)
+    assert alarms <= 4
+    assert {"d_2", "d_3"} <= set(times)  # their sum is seen
+    for those in times.values():
+        assert 0.85 < np.std(those) < 1.15
+
+
+def test_without_correlations_nothing_is_told_that_they_would_not_tell() -> None:
+    rng = np.random.default_rng(2)
+    rate, truth = changing(d_3=0.2), drawn(1, rng)
+    known = campaigns(truth, (0, 6), rng, (STRONG, OTHER), rate)
+    blind = campaigns(truth, (0, 6), rng, (STRONG, OTHER), rate, correlated=False)
+    assert {one.parameter for one in known.significant} == {"d_2", "d_3"}
+    assert known.significant[0].together in (("d_2",), ("d_3",))
+    assert not blind.significant
+
+
+def test_a_drift_is_found_with_its_rate_and_where_it_is() -> None:
+    rng = np.random.default_rng(3)
+    rate = changing(theta_offset_4=0.2)  # 0.02 deg a month
+    found = campaigns(drawn(1, rng), (0, 3, 6, 11), rng, (STRONG, OTHER, STRONG, OTHER), rate)
+    (one,) = found.significant
+    assert (one.machine, one.parameter, one.campaigns, one.steady) == ("m0", "theta_offset_4", 4, True)
+    assert np.degrees(one.low) < 0.02 < np.degrees(one.high)
+    assert np.degrees(one.change) == pytest.approx(0.02 * 334 / MONTH, abs=0.005)
+    assert one.changes[0] == 0.0
+    assert np.degrees(one.changes[-1]) == pytest.approx(0.02 * 334 / MONTH, abs=0.005)
+
+
+def test_intervals_of_rates_cover_the_truth_all_together() -> None:
+    rng = np.random.default_rng(4)
+    rate = 0.03 * rng.standard_normal(COUNT)
+    off, together = [], []
+    for _ in range(20):
+        found = campaigns(rng.standard_normal((3, COUNT)), (0, 4, 9), rng, (STRONG, OTHER, OTHER), rate)
+        alone = [one for one in found.found if one.alone]
+        true = [rate[NAMES.index(one.parameter)] * campaign().prior[NAMES.index(one.parameter)] for one in alone]
+        off += [(one.slope - t) / (one.slope / one.times) for one, t in zip(alone, true, strict=True)]
+        together.append(all(one.low <= t <= one.high for one, t in zip(alone, true, strict=True)))
+        assert all(one.significant == (one.low > 0.0 or one.high < 0.0) for one in found.found)
+    assert 0.92 <= np.mean(np.abs(off) < 1.96) <= 0.98
+    assert sum(together) >= 17  # 19 are promised; chance gives fewer than 17 in 1 of 60 runs
+
+
+def test_a_jump_is_a_change_but_not_steady() -> None:
+    rng = np.random.default_rng(5)
+    truth = rng.standard_normal((1, COUNT))
+    told = []
+    for month, jump in ((0, 0.0), (4, 0.0), (8, 3.0)):
+        there = truth.copy()
+        there[0, NAMES.index("theta_offset_3")] += jump
+        told += rows(there, rng, names=[f"c{month}"], of="m", date=f"2026-{month + 1:02d}-01")
+    (one,) = drifts(kind_of(told)).significant
+    assert one.parameter == "theta_offset_3"
+    assert one.steady is False
+
+
+def test_what_base_or_target_can_do_instead_is_not_told() -> None:
+    rng = np.random.default_rng(6)
+    found = campaigns(drawn(2, rng), (0, 6), rng, (STRONG, OTHER), changing(theta_offset_1=3.0))
+    assert not found.significant
+    assert {"theta_offset_1", "d_1", "theta_offset_6"} <= set(found.unknown)
+
+
+def test_a_change_of_all_machines_alike_is_named() -> None:
+    rng = np.random.default_rng(17)
+    found = campaigns(drawn(8, rng), (0, 6), rng, (STRONG, OTHER), changing(a_3=0.05))
+    alike = {one.parameter: one for one in found.alike}
+    assert alike["a_3"].low < 0.05e-3 < alike["a_3"].high
+    assert len(alike) <= 2
+
+
+def test_machines_without_two_dates_are_named() -> None:
+    rng = np.random.default_rng(8)
+    truth = rng.standard_normal((1, COUNT))
+    told = rows(truth, rng, names=["a"], of="m") + rows(truth, rng, names=["b"], of="m", date="2026-01-01")
+    found = drifts(kind_of(told))
+    assert found.undated == ("m",)
+    assert not found.found
+
+
+def test_of_many_machines_the_surest_of_each_is_kept() -> None:
+    rng = np.random.default_rng(9)
+    found = campaigns(drawn(60, rng), (0, 6), rng, (STRONG, OTHER), changing(a_3=0.5, theta_offset_4=0.5))
+    assert {one.parameter for one in found.significant} == {"a_3", "theta_offset_4"}
+    assert (len(found.significant), len(found.found), found.compared) == (120, 120, 60 * 19)
+
+
+def test_another_robot_under_the_same_serial_number_is_suspected() -> None:
+    rng = np.random.default_rng(10)
+    truth = rng.standard_normal((3, COUNT))
+    first, later = "2026-01-01", "2026-07-01"
+    told = [
+        *rows(truth[:1], rng, names=["a"], of="m", date=first),
+        *rows(truth[1:2], rng, names=["b"], of="m", date=later),
+        *rows(truth[2:], rng, names=["c"], of="n", date=first),
+        *rows(truth[2:], rng, names=["d"], of="n", date=later),
+    ]
+    found = drifts(kind_of(told))
+    assert found.others == ("m",)
+    (notice,) = [each for each in analysis_notices(analysed(told)) if each.code == "another-machine"]
+    assert (notice.level, "of m changed" in notice.message) == ("warning", True)
+
+
+# -- all that a fleet says ---------------------------------------------------------------------------------
 
 
 def analysis_lines(found: Analysis) -> list[str]:
@@ -39,12 +391,8 @@ def test_robots_are_looked_at_in_the_order_of_their_reasons() -> None:
     fleet[8] = replace(fleet[8], held_out=Accuracy(3e-3, 3e-3, 3e-3, 20))
     fleet[9] = Row("robot-10", "failed", "there is no reading", robot="")
     zero = fleet[11].parameters["theta_offset_3"]
-    fleet[11] = replace(
-        fleet[11],
-        parameters=FoundParameters.of(
-            {**fleet[11].parameters, "theta_offset_3": replace(zero, value=zero.value + np.radians(2.0))}
-        ),
-    )
+    turned = {**fleet[11].parameters, "theta_offset_3": replace(zero, value=zero.value + np.radians(2.0))}
+    fleet[11] = replace(fleet[11], parameters=FoundParameters.of(turned))
     found = analysed(fleet)
     why = {look.robot: [reason.why for reason in look.reasons] for look in found.looks}
     assert why == {
@@ -86,23 +434,24 @@ def test_a_machine_counts_once_with_its_last_measurement() -> None:
     assert (found.measurements, found.machines) == (3, 2)
     assert sorted(found.errors["held_out"].mean.tolist())[-1] == 1.0
     assert [found.kinds[0].kind.names[i] for i in found.kinds[0].kind.latest] == ["robot-1", "robot-3"]
+    wrong = replace(first, errors=("wrong-units",))  # of a machine the last campaign without an error counts
+    assert analysed([wrong, second]).errors["held_out"].mean.tolist() == [2.0]
 
 
 def test_kinds_of_robots_are_compared_among_themselves() -> None:
     fleet = series(12) + [replace(row, name=f"{row.name}-b", robot="other") for row in series(4, 2)]
     found = analysed(fleet)
     assert [(kind.kind.robot, len(kind.kind.names)) for kind in found.kinds] == [("irb120", 12), ("other", 4)]
-    assert any(
-        line.startswith("other: Parameters of 4 robots compared with their priors") for line in analysis_lines(found)
-    )
+    begin = "other: Parameters of 4 robots compared with their priors"
+    assert any(line.startswith(begin) for line in analysis_lines(found))
 
 
 def test_notices_say_what_figures_do_not() -> None:
     rng = np.random.default_rng(5)
     truth = 0.2 * rng.standard_normal((6, COUNT))
-    truth[2, campaign().names.index("theta_offset_3")] = 20.0
+    truth[2, NAMES.index("theta_offset_3")] = 20.0
     drifted = truth.copy()
-    drifted[:, campaign().names.index("a_3")] += 1.0
+    drifted[:, NAMES.index("a_3")] += 1.0
     fleet = []
     for i in range(6):
         fleet += rows(truth[i : i + 1], rng, names=[f"r{i}"], of=f"m{i}", date="2026-01-01")
@@ -134,18 +483,15 @@ def test_json_holds_figures_in_mm_and_deg() -> None:
     assert said["errors_mm"]["held_out"]["of_means"][3]["value"] is None
 
 
-def test_a_fleet_in_which_nothing_was_calibrated_says_so() -> None:
+def test_a_fleet_without_any_result_and_a_series_beside_nominal_say_so() -> None:
     found = analysed([Row("a", "failed", "no"), Row("b", "failed", "no")])
     assert not found.kinds
     assert not found.errors
     assert analysis_lines(found)[0].startswith("Not calibrated: 2 of 2; of such a series 15.8 to 100 %")
-
-
-def test_a_series_beside_nominal_is_told() -> None:
     rng = np.random.default_rng(6)
-    truth = 0.3 * rng.standard_normal((20, COUNT))
-    truth[:, campaign().names.index("d_4")] += 2.0
-    (line,) = [each for each in analysis_lines(analysed(rows(truth, rng))) if "beside nominal" in each]
+    truth = drawn(20, rng, 0.3)
+    truth[:, NAMES.index("d_4")] += 2.0
+    (line,) = (each for each in analysis_lines(analysed(rows(truth, rng))) if "beside nominal" in each)
     assert line.startswith("  The whole series lies beside nominal: d_4 +")
 
 
@@ -166,18 +512,92 @@ def test_results_that_end_with_an_error_are_in_no_figure() -> None:
         assert found.errors[name].mean.tolist() == errors.mean.tolist()
     assert found.kinds[0].spreads == whole.kinds[0].spreads
     assert found.kinds[0].differences == whole.kinds[0].differences
-    assert [(look.robot, [reason.why for reason in look.reasons]) for look in found.looks[:1]] == [
-        ("robot-5", ["error"])
-    ]
-    assert "Left out of all figures, because their results end with an error: 1 robot (robot-5)." in analysis_lines(
-        found
-    )
+    first = found.looks[0]
+    assert (first.robot, [reason.why for reason in first.reasons]) == ("robot-5", ["error"])
+    said = "Left out of all figures, because their results end with an error: 1 robot (robot-5)."
+    assert said in analysis_lines(found)
     assert held_by(analysis_blocks(found))["left_out"] == ["robot-5"]
 
 
-def test_of_a_machine_the_last_campaign_without_an_error_counts() -> None:
-    first, second = series(2)
-    first = replace(first, of="m", date="2026-01-01")
-    second = replace(second, of="m", date="2026-07-01", errors=("wrong-units",))
-    assert first.held_out is not None
-    assert analysed([first, second]).errors["held_out"].mean.tolist() == [first.held_out.mean]
+# -- pictures: of few robots every value, of many no more than a picture needs -------------------------------------
+
+
+def fleet(robots: int, off: float = 12.0, worst: float = 1.0) -> Analysis:
+    rng = np.random.default_rng(1)
+    truth = rng.standard_normal((robots, COUNT))
+    truth[1, NAMES.index("theta_offset_3")] = off
+    errors = rng.uniform(4e-5, 6e-5, robots)
+    errors[1] *= worst
+    return analysed(
+        replace(row, held_out=Accuracy(e, e, 2 * e, 9), nominal=Accuracy(2e-3, 2e-3, 4e-3, 9))
+        for row, e in zip(rows(truth, rng), errors.tolist(), strict=True)
+    )
+
+
+@pytest.mark.parametrize("robots", [4, 12, 60])
+def test_a_robot_a_thousand_times_off_does_not_hide_the_others(robots: int) -> None:
+    figures = fleet_figures(fleet(robots, 1000.0, 1000.0))
+    parameters = figures["parameters"]
+    marked = next(trace for trace in parameters["data"] if trace.get("name") == "differs")
+    far = marked["text"].index("robot-2")
+    assert (marked["x"][far], marked["marker"]["symbol"][far]) == ("theta_offset_3", "triangle-up")
+    assert marked["customdata"][far] == pytest.approx(1000.0, rel=0.05)
+    drawn = [abs(y) for trace in parameters["data"] if trace["type"] == "scatter" for y in trace["y"]]
+    assert max(drawn) < 12.0
+    assert parameters["layout"]["yaxis"]["title"]["text"].endswith("triangles: beyond (robot-2)")
+    assert figures["accuracy"]["layout"]["yaxis"]["type"] == "log"
+    if robots > 10:
+        histogram = figures["histogram"]
+        assert max(histogram["data"][0]["x"]) < 0.07
+        assert sum(histogram["data"][0]["y"]) == robots - 1
+        assert histogram["layout"]["annotations"][0]["text"].startswith("beyond: robot-2 ")
+
+
+def test_values_that_lie_together_are_all_drawn_at_their_places() -> None:
+    figures = fleet_figures(fleet(12, 3.0))
+    assert "beyond" not in figures["parameters"]["layout"]["yaxis"]["title"]["text"]
+    assert figures["histogram"]["layout"]["annotations"] == []
+
+
+def test_of_three_robots_every_value_is_drawn() -> None:
+    figures = fleet_figures(fleet(3))
+    assert set(figures) == {"accuracy", "parameters"}
+    assert [len(trace["x"]) for trace in figures["accuracy"]["data"]] == [3, 3]
+    marked = figures["parameters"]["data"][-1]
+    assert (marked["name"], marked["x"], marked["text"]) == ("differs", ["theta_offset_3"], ["robot-2"])
+    assert marked["y"][0] == pytest.approx(12.0, abs=0.5)
+
+
+def test_of_many_robots_the_pictures_stay_small() -> None:
+    figures = fleet_figures(fleet(2000))
+    assert set(figures) == {"accuracy", "histogram", "parameters", "spread"}
+    assert len(json.dumps(figures)) < 30_000
+    assert sum(figures["histogram"]["data"][0]["y"]) == 2000
+    box, marked = figures["parameters"]["data"]
+    assert box["type"] == "box"
+    assert box["median"][box["x"].index("a_3")] == pytest.approx(0.0, abs=0.1)
+    assert box["upperfence"][box["x"].index("a_3")] == pytest.approx(1.96, abs=0.15)
+    assert marked["text"] == ["robot-2"]
+    spread = dict(zip(figures["spread"]["data"][0]["x"], figures["spread"]["data"][0]["y"], strict=True))
+    assert spread["a_3"] == pytest.approx(1.0, abs=0.06)
+    assert "d_2" not in spread
+
+
+def test_changes_are_drawn_in_their_unit() -> None:
+    rng = np.random.default_rng(2)
+    truth = rng.standard_normal((1, COUNT))
+    later = truth.copy()
+    later[0, NAMES.index("theta_offset_4")] += 2.0
+    told = [
+        *rows(truth, rng, names=["a"], of="<m>", date="2026-01-01"),
+        *rows(later, rng, names=["b"], of="<m>", date="2026-07-01"),
+    ]
+    figures = fleet_figures(analysed(told))
+    marks, line = figures["drift-angles"]["data"]
+    legend = figures["drift-angles"]["layout"]["legend"]
+    assert (legend["yref"], legend["y"]) == ("container", 0)  # the toolbar is at the top
+    assert marks["name"] == "&lt;m&gt;, theta_offset_4"
+    assert marks["y"][-1] == pytest.approx(0.2, abs=0.01)
+    assert marks["error_y"]["array"][0] == 0.0
+    assert line["y"][-1] == pytest.approx(0.2, abs=0.01)
+    assert all("no more than chance" in t["name"] for t in figures["drift-lengths"]["data"] if "name" in t)

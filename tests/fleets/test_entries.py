@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.expecting import refused
 
 import truearm
-from truearm.engine.base.errors import InputError
 from truearm.fleets.entries import OPTIONS, robots_of
 from truearm.fleets.manifest import read_manifest
 
@@ -45,9 +46,7 @@ def test_a_table_gives_every_robot_its_options(folder: Path) -> None:
     one, two = read_manifest(path).robots
     assert (one.robot, one.data, one.of, one.date) == ("ur5", folder / "a.csv", "4711", "2026-03-01")
     assert one.options == {"model": "geometric", "seed": 3, "train": 40, "bounds": str(folder / "bounds.yaml")}
-    assert two.robot == str(folder / "arm.yaml")
-    assert two.options["model"] == "elastic"
-    assert two.options["train"] == "all"
+    assert (two.robot, two.options["model"], two.options["train"]) == (str(folder / "arm.yaml"), "elastic", "all")
     assert two.options["effects"] == ["backlash", "clearance"]
     assert {"a.csv", "b.csv", "arm.yaml", "robots.csv", "bounds.yaml"} <= set(read_manifest(path).hashes)
 
@@ -65,6 +64,7 @@ REFUSED = {
     "a missing file": (HEADER + ROW + "two,ur5,c.csv,,,,,\n", "robots.csv, line 3, column data", "no such file"),
     "a missing robot file": (HEADER + "one,leg.yaml,a.csv,,,,,\n", "line 2, column robot", "no such file"),
     "two robots of one name": (HEADER + ROW + "One,ur5,b.csv,,,,,\n", "line 3, column name", "same name"),
+    "one name, few columns": ("name,robot,data\none,ur5,a.csv\none,ur5,b.csv\n", "line 3, column name", "same name"),
     "a name that is no folder": (HEADER + "../one,ur5,a.csv,,,,,\n", "line 2, column name", "cannot be a name"),
     "an unknown column": ("name,robot,data,modell\none,ur5,a.csv,geometric\n", "line 1", "Did you mean model?"),
     "a column twice": ("name,robot,data,of,of\none,ur5,a.csv,1,2\n", "line 1", "two columns"),
@@ -77,28 +77,17 @@ REFUSED = {
     "an unknown effect": (HEADER + "one,ur5,a.csv,,,,,backlsh\n", "line 2, column effects", "Did you mean backlash?"),
     "no numbers": ("name,robot,data,gravity\none,ur5,a.csv,down\n", "line 2, column gravity", "numbers"),
     "no payload": ("name,robot,data,payload\none,ur5,a.csv,heavy\n", "line 2, column payload", "heavy"),
-    "a missing bounds file": (
-        "name,robot,data,bounds\none,ur5,a.csv,b.yaml\n",
-        "line 2, column bounds",
-        "no such file",
-    ),
-    "readings of two campaigns": (
-        HEADER + "one,ur5,a.csv,4711,2026-01-01,,,\ntwo,ur5,a.csv,4711,2026-07-01,,,\n",
-        "line 3, column data",
-        "the same readings stand for two campaigns of",
-    ),
+    "no bounds file": ("name,robot,data,bounds\none,ur5,a.csv,b.yaml\n", "line 2, column bounds", "no such file"),
     "a header alone": (HEADER, "robots.csv", "no rows"),
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_table_that_cannot_be_used_is_refused_where_it_is_wrong(case: str, folder: Path) -> None:
-    text, where, words = REFUSED[case]
-    path = table(folder, text)
-    with pytest.raises(InputError) as refusal:
-        read_manifest(path)
-    assert where in str(refusal.value)
-    assert words in str(refusal.value)
+def test_a_table_that_cannot_be_used_is_refused_where_it_is_wrong(folder: Path) -> None:
+    for case, (text, where, words) in REFUSED.items():
+        told = refused(None, "", read_manifest, table(folder, text))
+        assert (where in told, words in told) == (True, True), (case, told)
+    wrong = table(folder, HEADER + ROW, "{loss: square}")
+    refused(None, r"fleet.yaml, options.loss: there is nothing of this name", read_manifest, wrong)
 
 
 LISTED: dict[str, tuple[dict[str, Any], str, str]] = {
@@ -111,58 +100,32 @@ LISTED: dict[str, tuple[dict[str, Any], str, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", LISTED)
-def test_an_entry_that_cannot_be_used_is_refused_by_its_place(case: str, folder: Path) -> None:
-    changed, where, words = LISTED[case]
-    said = [{"name": "one", "robot": "ur5", "data": "a.csv", **changed}]
-    with pytest.raises(InputError) as refusal:
-        robots_of(said, {}, folder / "fleet.yaml")
-    assert where in str(refusal.value)
-    assert words in str(refusal.value)
+def test_an_entry_that_cannot_be_used_is_refused_by_its_place(folder: Path) -> None:
+    for case, (changed, where, words) in LISTED.items():
+        said = [{"name": "one", "robot": "ur5", "data": "a.csv", **changed}]
+        told = refused(None, "", robots_of, said, {}, folder / "fleet.yaml")
+        assert (where in told, words in told) == (True, True), (case, told)
+    refused(None, "no such file", robots_of, "fleet.csv", {}, folder / "fleet.yaml")
+    refused(None, "there are no robots", robots_of, [], {}, folder / "fleet.yaml")
 
 
-def test_options_of_all_robots_are_refused_in_the_manifest(folder: Path) -> None:
-    with pytest.raises(InputError, match=r"fleet.yaml, options.loss: there is nothing of this name"):
-        read_manifest(table(folder, HEADER + ROW, "{loss: square}"))
-
-
-def test_a_missing_table_and_no_robots_are_refused(folder: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        robots_of("fleet.csv", {}, folder / "fleet.yaml")
-    with pytest.raises(InputError, match="there are no robots"):
-        robots_of([], {}, folder / "fleet.yaml")
-
-
-@pytest.mark.parametrize(
-    ("of", "who"),
-    [
-        ("4711", "two campaigns of 4711, one and two"),
-        ("4712", "two robots, one and two"),
-        ("", "two robots, one and two"),
-    ],
-)
-@pytest.mark.parametrize("data", ["a.csv", "copy.csv"])
-def test_the_same_readings_are_neither_two_robots_nor_two_campaigns(of: str, who: str, data: str, folder: Path) -> None:
+def test_the_same_readings_are_neither_two_robots_nor_two_campaigns(folder: Path) -> None:
     (folder / "copy.csv").write_bytes((folder / "a.csv").read_bytes())
-    rows = f"one,ur5,a.csv,4711,2026-01-01,,,\ntwo,ur5,{data},{of},2026-07-01,,,\n"
-    with pytest.raises(InputError, match=r"line 3, column data: the same readings stand for") as refusal:
-        read_manifest(table(folder, HEADER + rows))
-    assert who in refusal.value.what
-    assert "List them once, or give the right file." in str(refusal.value.cure)
+    robots = "two robots, one and two"
+    for of, who in (("4711", "two campaigns of 4711, one and two"), ("4712", robots), ("", robots)):
+        for data in ("a.csv", "copy.csv"):
+            rows = f"one,ur5,a.csv,4711,2026-01-01,,,\ntwo,ur5,{data},{of},2026-07-01,,,\n"
+            words = f"line 3, column data: the same readings stand for {who}.*List them once, or give the right file."
+            refused(None, words, read_manifest, table(folder, HEADER + rows))
 
 
-@pytest.mark.parametrize("written", ["0123", "1_000", "0x7b", "+12"])
-@pytest.mark.parametrize("entry", ["of", "name"])
-def test_numbers_that_yaml_would_write_otherwise_belong_in_quotes(folder: Path, entry: str, written: str) -> None:
-    robot = {"name": "one", "robot": "ur5", "data": "a.csv", entry: written}
-    said = ", ".join(f"{name}: {text}" for name, text in robot.items())
-    (folder / "fleet.yaml").write_text(f"truearm: truearm-fleet/1\nrobots:\n  - {{{said}}}\n", "utf-8")
-    with pytest.raises(InputError, match=rf"robots\[1\].{entry}: without quotes this is a number") as refusal:
-        read_manifest(folder / "fleet.yaml")
-    assert refusal.value.came == written
-
-
-def test_numbers_in_quotes_and_plain_ones_stay_as_they_are_written(folder: Path) -> None:
+def test_numbers_that_yaml_would_write_otherwise_belong_in_quotes(folder: Path) -> None:
+    for entry, written in product(("of", "name"), ("0123", "1_000", "0x7b", "+12")):
+        robot = {"name": "one", "robot": "ur5", "data": "a.csv", entry: written}
+        said = ", ".join(f"{name}: {text}" for name, text in robot.items())
+        (folder / "fleet.yaml").write_text(f"truearm: truearm-fleet/1\nrobots:\n  - {{{said}}}\n", "utf-8")
+        words = rf"robots\[1\].{entry}: without quotes this is a number"
+        assert written in refused(None, words, read_manifest, folder / "fleet.yaml")
     (folder / "fleet.yaml").write_text(
         "truearm: truearm-fleet/1\nrobots:\n"
         "  - {name: 7, robot: ur5, data: a.csv, of: '0123'}\n  - {name: '08', robot: ur5, data: b.csv, of: 123}\n",

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -35,24 +36,23 @@ def simulated(model: str, trials: int) -> MonteCarlo:
     return monte_carlo(robot, q, BY_NAME[model], SIGMA, trials, rng, held_out)
 
 
-@pytest.mark.parametrize("model", ["offsets", "geometric"])
-def test_intervals_contain_the_truth_as_often_as_they_say(model: str) -> None:
-    trials = simulated(model, 1000)
-    assert trials.converged.all()
-    joints = [p.group not in ("base", "target") for p in trials.problem.free.parameters]
-    informed = (trials.informed > 0.5)[:, joints]
-    inside = np.abs(trials.estimate - trials.truth) < 1.959964 * trials.deviation
-    assert informed.sum() >= 4000
-    assert 0.93 <= inside[:, joints][informed].mean() <= 0.97
+def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
+    for model in ("offsets", "geometric"):
+        trials = simulated(model, 1000)
+        assert trials.converged.all(), model
+        joints = [p.group not in ("base", "target") for p in trials.problem.free.parameters]
+        informed = (trials.informed > 0.5)[:, joints]
+        inside = np.abs(trials.estimate - trials.truth) < 1.959964 * trials.deviation
+        assert informed.sum() >= 4000, model
+        assert 0.93 <= inside[:, joints][informed].mean() <= 0.97, model
 
 
-@pytest.mark.parametrize("model", ["offsets", "joints", "geometric"])
-def test_trials_together_are_what_the_solver_finds_alone(model: str) -> None:
-    together = simulated(model, 5)
-    for trial in range(5):
+def test_trials_together_are_what_the_solver_finds_alone() -> None:
+    for model, trial in product(("offsets", "joints", "geometric"), range(5)):
+        together = simulated(model, 5)
         alone = solve(replace(together.problem, data=together.dataset(trial)))
-        assert alone.converged
-        np.testing.assert_allclose(together.estimate[trial], alone.vector, rtol=0, atol=1e-9)
+        assert alone.converged, (model, trial)
+        np.testing.assert_allclose(together.estimate[trial], alone.vector, rtol=0, atol=1e-9, err_msg=model)
 
 
 def test_trials_together_are_calibrations_of_their_datasets() -> None:
@@ -96,18 +96,10 @@ def test_a_problem_at_many_vectors_is_the_problem_at_each() -> None:
     robot = (
         BY_NAME["joints"].prepared(load_robot("irb120")).with_frames(Transform(), {"1": frame, "2": (0.1, 0.1, 0.1)})
     )
-    quaternion = np.concatenate([rng.normal(size=(7, 4)), np.full((7, 4), np.nan)])
-    data = Dataset(
-        source="made",
-        labels=tuple("abcdefg"),
-        joints=robot.random_configurations(7, rng),
-        joint_kinds=("revolute",) * 6,
-        targets=("1", "2"),
-        configuration=np.concatenate([np.arange(7), rng.permutation(7)]),
-        target=np.repeat([0, 1], 7),
-        position=rng.normal(size=(14, 3)),
-        quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
-    )
+    quaternion = np.stack([rng.normal(size=(7, 4)), np.full((7, 4), np.nan)], axis=1)
+    quaternion /= np.linalg.norm(quaternion, axis=2, keepdims=True)
+    joints, seen = robot.random_configurations(7, rng), rng.normal(size=(7, 2, 3))
+    data = Dataset.of(joints, seen, quaternions=quaternion).of_readings(rng.permutation(14))
     problem = Problem(robot, data, BY_NAME["joints"].free(robot), {"position": 1e-4, "orientation": 1e-4})
     vectors = problem.free.start + 1e-2 * rng.normal(size=(4, len(problem.free.names)))
     together = problem.at(vectors)

@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.expecting import known
+from tests.expecting import refused as said_of
 
 import truearm
 from truearm.engine.base.errors import InputError
@@ -25,6 +27,8 @@ from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
 from truearm.fleets import recorded
 from truearm.fleets.manifest import experiment, read_manifest
+from truearm.fleets.parts import Task
+from truearm.fleets.parts import finished as done_part
 from truearm.fleets.recorded import Recorded
 from truearm.fleets.result import Fleet, Run
 from truearm.fleets.series import Experiment, ExperimentEntry, Row, Series, calibrated
@@ -39,6 +43,13 @@ def manifest(folder: Path, chunk: int = 2, name: str = "fleet.yaml", **entries: 
     )
     (folder / name).write_text(text)
     return folder / name
+
+
+def refused(file: Path, out: Path, **how: Any) -> InputError:
+    """Return what is said of a fleet that is refused; of one worker, if nothing else is said."""
+    with pytest.raises(InputError) as caught:
+        truearm.fleet(file, out=out, **(how or {"workers": 1}))
+    return caught.value
 
 
 def without_seconds(rows: list[Row]) -> list[dict[str, Any]]:
@@ -60,8 +71,7 @@ def test_each_robot_is_what_one_calibration_of_it_finds() -> None:
     readings = series.problem.at(truth).residual + rng.standard_normal((1, series.problem.rows))
     found, _, settled = calibrated(series.problem, readings)
     data = series.problem.data
-    assert data.sigma is not None
-    moved = data.position + readings[0].reshape(-1, 3) * data.sigma[:, None]
+    moved = data.position + readings[0].reshape(-1, 3) * known(data.sigma)[:, None]
     fit = identify(series.made.robot, replace(data, position=moved), named_model("geometric"))
     alone = np.array([fit.robot.parameters[name].value for name in free.names])
     assert settled.all()
@@ -72,12 +82,8 @@ def test_errors_are_those_of_the_drawn_robot() -> None:
     series = Series(experiment(ASKED))
     rows = series.rows(range(6))
     for row in rows:
-        assert row.status == "calibrated"
-        assert row.truth is not None
-        assert row.held_out is not None
-        assert row.nominal is not None
-        assert row.truth.mean < row.held_out.mean < row.nominal.mean / 5
-        assert row.truth.n == 8
+        assert (row.status, known(row.truth).n) == ("calibrated", 8)
+        assert known(row.truth).mean < known(row.held_out).mean < known(row.nominal).mean / 5
         off = [abs(p.value - (p.truth or 0.0)) / p.deviation for p in row.parameters.values() if p.deviation > 0]
         assert np.mean(np.array(off) < 3.0) > 0.9
     assert len({row.parameters["a_2"].truth for row in rows}) == 6
@@ -97,8 +103,8 @@ def test_parts_and_who_computes_them_change_no_digit(tmp_path: Path) -> None:
     two = truearm.fleet(manifest(tmp_path, 3), out=tmp_path / "two", workers=2)
     rows = [without_seconds([*found.recorded.rows()]) for found in (one, other, two)]
     assert rows[0] == rows[1] == rows[2]
-    for name in ("robots.csv",):
-        assert len({(tmp_path / folder / name).read_bytes() for folder in ("one", "other", "two")}) == 1
+    (table,) = {(tmp_path / folder / "robots.csv").read_text() for folder in ("one", "other", "two")}
+    assert table.startswith("name,of,date,status,")
 
 
 class Counting(Executor):
@@ -154,12 +160,6 @@ def test_a_full_disk_is_named_and_what_was_written_before_is_kept(
     assert truearm.fleet(file, out=out, workers=1).run.before == 1
 
 
-def refused(call: Callable[[], object]) -> InputError:
-    with pytest.raises(InputError) as caught:
-        call()
-    return caught.value
-
-
 def test_a_folder_belongs_to_its_manifest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = tmp_path / "plan.csv"
     truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, out=plan)
@@ -167,13 +167,13 @@ def test_a_folder_belongs_to_its_manifest(tmp_path: Path, monkeypatch: pytest.Mo
     truearm.fleet(file, out=out, workers=1)
     truearm.fleet(file, out=out, workers=1)
     other = manifest(tmp_path, name="other.yaml", configurations="plan.csv", seed=2)
-    assert "of another manifest" in str(refused(lambda: truearm.fleet(other, out=out, workers=1)))
+    assert "of another manifest" in str(refused(other, out))
     truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, seed=1, out=plan)
-    told = refused(lambda: truearm.fleet(file, out=out, workers=1))
+    told = refused(file, out)
     assert "has changed since" in str(told)
     assert told.came == "plan.csv"
     monkeypatch.setattr(recorded, "__version__", "99.0")
-    assert "another version of truearm" in str(refused(lambda: truearm.fleet(file, out=out, workers=1)))
+    assert "another version of truearm" in str(refused(file, out))
 
 
 def test_folders_of_others_are_refused(tmp_path: Path) -> None:
@@ -182,10 +182,10 @@ def test_folders_of_others_are_refused(tmp_path: Path) -> None:
         out = tmp_path / f"out-{made}"
         out.mkdir()
         (out / name).write_text(made)
-        assert refused(lambda out=out: truearm.fleet(file, out=out, workers=1)).where is not None  # type: ignore[misc]
+        assert refused(file, out).where is not None
         assert (out / name).read_text() == made
     (tmp_path / "out" / "parts" / "mine").mkdir(parents=True)
-    assert "whose it is" in str(refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1)))
+    assert "whose it is" in str(refused(file, tmp_path / "out"))
 
 
 DAMAGES: dict[str, Callable[[str], str]] = {
@@ -214,36 +214,29 @@ DAMAGES: dict[str, Callable[[str], str]] = {
 }
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_part_that_is_not_as_it_was_written_is_named(
-    tmp_path: Path, damage: str, finished: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, out = manifest(tmp_path), tmp_path / "out"
-    shutil.copytree(finished, out)
-    part = out / "parts" / "0000" / "0000002.jsonl"
-    part.write_text(DAMAGES[damage](part.read_text()))
-    begun: list[object] = []
-    monkeypatch.setattr("truearm.fleets.running._computed", lambda *given: begun.append(given))
-    told = refused(lambda: truearm.fleet(file, out=out, workers=1))
-    assert (told.where, told.parameter, begun) == (str(part), "out", [])
-
-
 #: Only the hash tells of these.
 HASH_ALONE = ("a robot less", "no hash", "another figure")
 
 
-@pytest.mark.parametrize("damage", [name for name in DAMAGES if name not in HASH_ALONE])
-def test_a_changed_part_with_the_hash_of_its_changes_is_named_too(tmp_path: Path, damage: str, finished: Path) -> None:
-    file, out = manifest(tmp_path), tmp_path / "out"
-    shutil.copytree(finished, out)
+def test_a_part_that_is_not_as_it_was_written_is_named(
+    tmp_path: Path, finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, out = manifest(tmp_path), shutil.copytree(finished, tmp_path / "out")
     part = out / "parts" / "0000" / "0000002.jsonl"
-    before = "".join(part.read_text().splitlines(keepends=True)[:-1])
-    text = DAMAGES[damage](before)
-    assert text != before
-    hashed = hashlib.sha256(text.encode()).hexdigest()
-    part.write_text(text + json.dumps({"sha256": hashed}) + "\n")
-    told = refused(lambda: truearm.fleet(file, out=out, workers=1))
-    assert (told.what, told.where) == ("this part of the fleet is not as it was written", str(part))
+    whole, begun = part.read_text(), list[object]()
+    monkeypatch.setattr("truearm.fleets.running._computed", lambda *given: begun.append(given))
+    for damage, done in DAMAGES.items():
+        begun.clear()
+        part.write_text(done(whole))
+        told = refused(file, out)
+        assert (told.where, told.parameter, begun) == (str(part), "out", []), damage
+        if damage not in HASH_ALONE:  # and it is named with the hash of its changes too
+            text = done("".join(whole.splitlines(keepends=True)[:-1]))
+            assert text != "".join(whole.splitlines(keepends=True)[:-1]), damage
+            part.write_text(text + json.dumps({"sha256": hashlib.sha256(text.encode()).hexdigest()}) + "\n")
+            told = refused(file, out)
+            said = (told.what, told.where)
+            assert said == ("this part of the fleet is not as it was written", str(part)), damage
 
 
 class Exchanging(Executor):
@@ -273,26 +266,22 @@ class Exchanging(Executor):
 def test_what_an_executor_must_not_return_is_refused_and_not_written(
     tmp_path: Path, wrong: Callable[[Any, Any], object], came: str
 ) -> None:
-    told = refused(lambda: truearm.fleet(manifest(tmp_path), out=tmp_path / "out", executor=Exchanging(wrong)))
+    told = refused(manifest(tmp_path), tmp_path / "out", executor=Exchanging(wrong))
     assert (told.parameter, came in str(told.came)) == ("executor", True)
     assert [*(tmp_path / "out").rglob("*.jsonl")] == []
 
 
-def test_a_part_that_was_removed_is_computed_again(tmp_path: Path, finished: Path) -> None:
-    file, out = manifest(tmp_path), tmp_path / "out"
-    shutil.copytree(finished, out)
-    (out / "parts" / "0000" / "0000002.jsonl").unlink()
+def test_a_part_that_was_removed_is_computed_again_and_one_of_another_fleet_is_named(
+    tmp_path: Path, finished: Path
+) -> None:
+    file, out = manifest(tmp_path), shutil.copytree(finished, tmp_path / "out")
+    part = Path("parts") / "0000" / "0000002.jsonl"
+    (out / part).unlink()
     assert truearm.fleet(file, out=out, workers=1).run.before == 2
-
-
-def test_a_part_of_another_fleet_is_named(tmp_path: Path, finished: Path) -> None:
     other = tmp_path / "other"
     truearm.fleet(manifest(tmp_path, name="other.yaml", seed=7), out=other, workers=1)
-    file, out = manifest(tmp_path), tmp_path / "out"
-    shutil.copytree(finished, out)
-    name = Path("parts") / "0000" / "0000002.jsonl"
-    shutil.copy(other / name, out / name)
-    assert refused(lambda: truearm.fleet(file, out=out, workers=1)).where == str(out / name)
+    shutil.copy(other / part, out / part)  # a part of another fleet
+    assert refused(file, out).where == str(out / part)
 
 
 def test_a_link_for_the_parts_is_refused(tmp_path: Path) -> None:
@@ -300,7 +289,7 @@ def test_a_link_for_the_parts_is_refused(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir()
     out.mkdir()
     (out / "parts").symlink_to(tmp_path / "elsewhere")
-    assert "this is a link" in str(refused(lambda: truearm.fleet(file, out=out, workers=1)))
+    assert "this is a link" in str(refused(file, out))
 
 
 def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
@@ -315,20 +304,8 @@ def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
 
     monkeypatch.setattr("truearm.fleets.running.experiment", late)
     file = manifest(tmp_path, configurations="plan.csv")
-    told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
+    told = refused(file, tmp_path / "out")
     assert ("changed while it was read" in str(told), told.where) == (True, "plan.csv")
-
-
-def test_a_fleet_without_any_result_ends_with_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from truearm.fleets import series as module
-
-    def unsettled(*given: Any) -> Any:
-        found, deviation, settled = calibrated(*given)
-        return found, deviation, np.zeros_like(settled)
-
-    monkeypatch.setattr(module, "calibrated", unsettled)
-    found = truearm.fleet(manifest(tmp_path), out=tmp_path / "out", workers=1)
-    assert ("no-result", "error") in [(notice.code, notice.level) for notice in found.warnings]
 
 
 def test_two_runs_at_once_in_one_folder_are_refused(tmp_path: Path) -> None:
@@ -336,7 +313,7 @@ def test_two_runs_at_once_in_one_folder_are_refused(tmp_path: Path) -> None:
     file, out = manifest(tmp_path), tmp_path / "out"
     truearm.fleet(file, out=out, workers=1)
     with Recorded(out, read_manifest(file)).alone():
-        assert "another run computes parts there" in str(refused(lambda: truearm.fleet(file, out=out, workers=1)))
+        assert "another run computes parts there" in str(refused(file, out))
 
 
 @pytest.mark.parametrize("other", ["the same manifest", "another manifest"])
@@ -348,10 +325,11 @@ def test_of_two_runs_that_begin_at_once_one_is_told_of_the_other(tmp_path: Path,
     second = Recorded(out, read_manifest(two))
     assert second.missing() == 3
     with Recorded(out, one).alone():
-        for begin in (second.missing, second.alone().__enter__, lambda: truearm.fleet(two, out=out, workers=1)):
-            assert "another run computes parts there" in str(refused(begin))
+        for begin in (second.missing, second.alone().__enter__):
+            said_of(None, "another run computes parts there", begin)
+        assert "another run computes parts there" in str(refused(two, out))
     if changed:
-        assert "the parts there are of another manifest" in str(refused(second.alone().__enter__))
+        said_of(None, "the parts there are of another manifest", second.alone().__enter__)
 
 
 @pytest.mark.parametrize("kind", ["same", "other"])
@@ -391,24 +369,28 @@ def test_robots_of_lost_parts_are_named_and_an_error(tmp_path: Path) -> None:
     assert "A worker died." in less.lines()
 
 
-def test_a_calibration_that_does_not_settle_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from truearm.fleets import series as module
-
+def test_a_calibration_that_does_not_settle_is_a_row_and_without_any_result_it_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def unsettled(*given: Any) -> Any:
         found, deviation, settled = calibrated(*given)
-        settled[:1] = False
+        settled[:lost] = False
         return found, deviation, settled
 
-    monkeypatch.setattr(module, "calibrated", unsettled)
+    monkeypatch.setattr("truearm.fleets.series.calibrated", unsettled)
+    lost = 1
     found = truearm.fleet(manifest(tmp_path), out=tmp_path / "out", workers=1)
     assert found.content()["calibrated"] == 2
     assert "robots-failed" in [notice.code for notice in found.warnings]
     assert next(found.recorded.rows()).message == "the calibration did not settle"
+    lost = 9
+    found = truearm.fleet(manifest(tmp_path), out=tmp_path / "none", workers=1)
+    assert ("no-result", "error") in [(notice.code, notice.level) for notice in found.warnings]
 
 
-@pytest.mark.parametrize(
-    ("entries", "what"),
-    [
+def test_what_cannot_be_meant_is_refused_and_nothing_written(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    wrong: tuple[tuple[dict[str, Any], str], ...] = (
         ({"robot": "irb12"}, "irb12"),
         ({"robot": "missing.yaml"}, "no such file"),
         ({"configurations": "missing.csv"}, "no such file"),
@@ -424,22 +406,13 @@ def test_a_calibration_that_does_not_settle_is_a_row(tmp_path: Path, monkeypatch
         ({"targets": 4}, "fewer targets"),
         ({"seed": -1}, "0 or more"),
         ({"truth": "random"}, "not known here"),
-    ],
-)
-def test_what_cannot_be_meant_is_refused_and_nothing_written(
-    tmp_path: Path, entries: dict[str, Any], what: str
-) -> None:
-    file = manifest(tmp_path, **entries)
-    told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=1))
-    assert what in str(told)
-    assert told.parameter == "manifest"
-    assert str(told.where).startswith(f"{file}, experiment")
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("text", "what"),
-    [
+    )
+    for entries, what in wrong:
+        file = manifest(tmp_path, **entries)
+        told = refused(file, out)
+        assert (told.parameter, what in str(told)) == ("manifest", True), told
+        assert str(told.where).startswith(f"{file}, experiment"), told
+    for text, what in (
         ("truearm: truearm-fleet/1\n", "one of them"),
         ("truearm: truearm-fleet/1\nexperiment: {robot: irb120, count: 2, noise: 1}\n", "has a unit"),
         (
@@ -448,25 +421,20 @@ def test_what_cannot_be_meant_is_refused_and_nothing_written(
             "only robots that were measured have options",
         ),
         ("truearm: truearm-fleet/2\n", "truearm-fleet/1"),
-    ],
-)
-def test_manifests_that_do_not_fit_are_refused(tmp_path: Path, text: str, what: str) -> None:
-    (tmp_path / "fleet.yaml").write_text(text)
-    told = refused(lambda: truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1))
-    assert what in str(told)
+    ):
+        (tmp_path / "fleet.yaml").write_text(text)
+        assert what in str(refused(tmp_path / "fleet.yaml", out))
+    assert not out.exists()
 
 
 def test_one_of_several_does_the_parts(tmp_path: Path) -> None:
     file = manifest(tmp_path)
-    told = refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=2, scheduler="127.0.0.1:1"))
+    told = refused(file, tmp_path / "out", workers=2, scheduler="127.0.0.1:1")
     assert told.parameter == "workers, scheduler"
     wrong: Any = "four"
-    assert refused(lambda: truearm.fleet(file, out=tmp_path / "out", executor=wrong)).parameter == "executor"
-    assert refused(lambda: truearm.fleet(file, out=tmp_path / "out", workers=5000)).parameter == "workers"
+    assert refused(file, tmp_path / "out", executor=wrong).parameter == "executor"
+    assert refused(file, tmp_path / "out", workers=5000).parameter == "workers"
 
 
 def test_a_worker_with_another_version_is_refused() -> None:
-    from truearm.fleets.parts import Task, finished
-
-    told = refused(lambda: finished(Task(0, "99.0")))
-    assert (told.parameter, told.allowed) == ("scheduler", "99.0")
+    said_of("scheduler", "99.0", done_part, Task(0, "99.0"))

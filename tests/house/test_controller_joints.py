@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import csv
-import re
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 import pytest
+from tests.expecting import known, refused
 from tests.simulated import campaign
 
 import truearm
-from truearm.engine.base.errors import InputError
 from truearm.engine.data.controller_joints import in_controller_joints, in_model_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
@@ -82,19 +81,19 @@ def test_a_file_is_read_and_written_as_it_is(pendant: Path, data: Dataset) -> No
     with_robot = truearm.load_data(pendant, FANUC)
     assert with_robot.joints_are == "converted"
     assert with_robot.joints == pytest.approx(data.joints, abs=1e-12)
+    _, plain = campaign("irb120", 8, 1e-5, 0)  # its controller counts as its model: it takes either name
+    pendant.write_text(csv_text(replace(plain, joints_are="controller")))
+    assert truearm.load_data(pendant, "irb120").joints == pytest.approx(plain.joints, abs=1e-12)
     assert csv_text(with_robot).startswith("configuration,joint_1 [deg],")
 
 
 def test_where_joints_came_from_is_that_of_the_models_joints() -> None:
-    joints = np.radians(
-        np.array([[0.0, 10.0, 20, 0, 0, 0], [0, 20, 20, 5, 0, 0], [0, 30, 20, 0, 0, 0], [0, 30, 25, 0, 0, 0]])
-    )
-    there = Dataset.of(joints, np.ones((4, 3)), order=[0, 1, 2, 3])
-    came = in_model_joints(
-        load_robot(FANUC), Dataset.of(shown(joints), np.ones((4, 3)), order=[0, 1, 2, 3], joints_are="controller")
-    )
-    assert there.approach is not None
-    assert came.approach == pytest.approx(there.approach)
+    rows = [[0.0, 10, 20, 0, 0, 0], [0, 20, 20, 5, 0, 0], [0, 30, 20, 0, 0, 0], [0, 30, 25, 0, 0, 0]]
+    joints, order = np.radians(np.array(rows)), [0, 1, 2, 3]
+    there = Dataset.of(joints, np.ones((4, 3)), order=order)
+    noted = Dataset.of(shown(joints), np.ones((4, 3)), order=order, joints_are="controller")
+    came = in_model_joints(load_robot(FANUC), noted)
+    assert came.approach == pytest.approx(known(there.approach))
     assert came.number == pytest.approx(there.number)
 
 
@@ -105,18 +104,15 @@ def test_converting_there_and_back_changes_nothing(data: Dataset) -> None:
     assert there.joints == pytest.approx(shown(data.joints))
     assert in_controller_joints(robot, there) is there
     back = in_model_joints(robot, there)
-    assert back.references is not None
-    for part in (back, back.references):
+    for part in (back, known(back.references)):
         assert part.joints == pytest.approx(data.joints, abs=1e-12)
         assert part.joints_are == "converted"
     assert in_model_joints(robot, back) is back
-
-
-def test_joint_positions_that_repeat_stay_equal_to_the_last_digit() -> None:
     joints = np.random.default_rng(0).uniform(-2, 2, size=(101, 6))
     twice = np.concatenate([joints, joints[::-1]])
-    read = in_model_joints(load_robot(FANUC), Dataset.of(twice, np.ones((202, 3)), joints_are="controller"))
-    assert (read.joints[:101] == read.joints[:100:-1]).all()
+    read = in_model_joints(robot, Dataset.of(twice, np.ones((202, 3)), joints_are="controller"))
+    assert (read.joints[:101] == read.joints[:100:-1]).all()  # what repeats stays equal to the last digit
+    refused(None, "joints of the reference points are of another kind", replace, data, references=there)
 
 
 def test_slides_and_zeros(tmp_path: Path) -> None:
@@ -132,13 +128,6 @@ def test_slides_and_zeros(tmp_path: Path) -> None:
     assert read.joints[:, 2] == pytest.approx([0.01, -0.05])
 
 
-def test_a_robot_whose_controller_counts_as_its_model_takes_either_name(tmp_path: Path) -> None:
-    _, data = campaign("irb120", 8, 1e-5, 0)
-    file = tmp_path / "axis.csv"
-    file.write_text(csv_text(replace(data, joints_are="controller")))
-    assert truearm.load_data(file, "irb120").joints == pytest.approx(data.joints, abs=1e-12)
-
-
 def test_other_tables_say_whose_joints_they_hold(tmp_path: Path) -> None:
     (tmp_path / "joints.txt").write_text("0 10 20\n5 15 30\n")
     (tmp_path / "points.txt").write_text("1 2 3\n4 5 6\n")
@@ -146,8 +135,7 @@ def test_other_tables_say_whose_joints_they_hold(tmp_path: Path) -> None:
     for whose, column in zip(get_args(JointsOf), ("axis_1", "joint_1"), strict=True):
         out = tmp_path / f"{whose}.csv"
         made = truearm.import_matrices(*files, angle_unit="deg", length_unit="mm", joints_are=whose, out=out)
-        assert made.data.joints_are == whose
-        assert column in out.read_text()
+        assert (made.data.joints_are, column in out.read_text()) == (whose, True)
     mapping = """\
 truearm: truearm-mapping/1
 length_unit: mm
@@ -155,59 +143,41 @@ configuration: {each: row}
 joints: {columns: [q1, q2], unit: degARE}
 readings: [{target: tip, x: x, y: y, z: z}]
 """
-    table = tmp_path / "table.csv"
+    table, file = tmp_path / "table.csv", tmp_path / "map.yaml"
     table.write_text("q1,q2,x,y,z\n10,20,100,200,300\n")
-    cases: list[tuple[str, JointsOf | None, str]] = [
-        ("", None, "model"),
-        ("", "controller", "controller"),
-        (", are: controller", None, "controller"),
-        (", are: controller", "controller", "controller"),
-    ]
-    for are, asked, expected in cases:
-        (tmp_path / "map.yaml").write_text(mapping.replace("ARE", are))
-        assert truearm.import_table(table, tmp_path / "map.yaml", joints_are=asked).data.joints_are == expected
-    with pytest.raises(InputError, match=r"joints\.are: the mapping says whose joint positions they are.*Leave one"):
-        truearm.import_table(table, tmp_path / "map.yaml", joints_are="model")
+    asked: JointsOf | None
+    for are in ("", ", are: controller"):
+        file.write_text(mapping.replace("ARE", are))
+        for asked in (None, "controller"):
+            expected = "controller" if are or asked else "model"
+            assert truearm.import_table(table, file, joints_are=asked).data.joints_are == expected
+    words = r"joints\.are: the mapping says whose joint positions they are.*Leave one"
+    refused(None, words, truearm.import_table, table, file, joints_are="model")
 
 
 def test_touched_cups_are_read_from_the_pendant(tmp_path: Path) -> None:
-    robot, q = (
-        load_robot(FANUC),
-        np.radians(np.array([[0.0, 10, 20, 30, 40, 50], [5, 5, 5, 5, 5, 5], [9, 8, 7, 6, 5, 4]])),
-    )
+    robot = load_robot(FANUC)
+    q = np.radians(np.array([[0.0, 10, 20, 30, 40, 50], [5] * 6, [9, 8, 7, 6, 5, 4]]))
     lines = [",".join(["cup", *(f"axis_{i} [deg]" for i in range(1, 7))])]
-    lines += [",".join([f"B{i}", *(repr(float(v)) for v in row)]) for i, row in enumerate(np.degrees(shown(q)), 1)]
+    lines += [",".join([f"B{i}", *map(repr, row)]) for i, row in enumerate(np.degrees(shown(q)).tolist(), 1)]
     file = tmp_path / "touches.csv"
     file.write_text("\n".join(lines) + "\n")
     assert read_touches(file, robot) == pytest.approx(q, abs=1e-12)
-    with pytest.raises(InputError, match=r"touches\.csv, column axis_1: it is not known how"):
-        read_touches(file, replace(robot, controller=Controller()))
+    unknown = replace(robot, controller=Controller())
+    refused(None, r"touches\.csv, column axis_1: it is not known how", read_touches, file, unknown)
 
 
-def wrong_sign(noted: Array) -> Array:
-    return noted * [1, -1, 1, 1, 1, 1]
-
-
-def exchanged(noted: Array) -> Array:
-    return noted[:, [0, 2, 1, 3, 4, 5]]
-
-
-@pytest.mark.parametrize(
-    ("slip", "code", "words"),
-    [
-        (np.radians, "unit-angle", "The joints: radians are called deg"),
-        (wrong_sign, "joint-sign", "sign of joint 2 is"),
-        (exchanged, "joint-sign", "Joints 2 and 3 are in the wrong order"),
-    ],
-)
-def test_other_slips_are_looked_for_in_what_was_noted(
-    data: Dataset, slip: Callable[[Array], Array], code: str, words: str
-) -> None:
+def test_other_slips_are_looked_for_in_what_was_noted(data: Dataset) -> None:
     robot = load_robot(FANUC)
     robot = replace(robot, controller=replace(robot.controller, zeros=(0.0, 0.0, 1.5, 0.0, 0.0, 0.0)))
     noted = in_controller_joints(robot, data)
-    said = truearm.check(robot, replace(noted, joints=slip(noted.joints))).warnings[0]
-    assert (said.code, words in said.message) == (code, True), said.message
+    for joints, code, words in (
+        (np.radians(noted.joints), "unit-angle", "The joints: radians are called deg"),
+        (noted.joints * [1, -1, 1, 1, 1, 1], "joint-sign", "sign of joint 2 is"),
+        (noted.joints[:, [0, 2, 1, 3, 4, 5]], "joint-sign", "Joints 2 and 3 are in the wrong order"),
+    ):
+        said = truearm.check(robot, replace(noted, joints=joints)).warnings[0]
+        assert (said.code, words in said.message) == (code, True), said.message
 
 
 # -- out -----------------------------------------------------------------------------------------------------
@@ -233,18 +203,21 @@ def test_a_plan_is_chosen_among_configurations_of_the_pendant(pendant: Path, dat
     assert plan.lines()[-1] == "Joint positions in the file are those that the robot's controller shows (axis_i)."
 
 
-@pytest.mark.parametrize(("whose", "column"), [("model", "joint"), ("controller", "axis"), (None, "axis")])
-def test_what_is_to_be_commanded_is_written_as_asked(tmp_path: Path, whose: Any, column: str) -> None:
-    robot = load_robot(FANUC)
+def test_what_is_to_be_commanded_is_written_as_asked(tmp_path: Path) -> None:
     q = np.radians([[10.0, 20.0, -40.0, 30.0, 50.0, 60.0]])
-    p, R = robot.forward(q)
-    found = truearm.inverse(FANUC, p, R, seed_joints=q[0], joints=whose, out=tmp_path / "ik.csv")
-    assert found.joints == pytest.approx(q, abs=1e-7)
-    line = truearm.lines(FANUC, (0.45, 0.0, 0.3), size=(0.1, 0.1, 0.1), joints=whose, out=tmp_path / "lines.csv")
-    for file, joints in (("ik.csv", found.joints), ("lines.csv", line.joints)):
-        written = [[float(row[f"{column}_{i} [deg]"]) for i in range(1, 7)] for row in rows(tmp_path / file)]
-        expected = joints if column == "joint" else shown(joints)
-        assert np.radians(written) == pytest.approx(expected, abs=1e-12)
+    p, R = load_robot(FANUC).forward(q)
+    whose: JointsOf | None
+    for whose in ("model", "controller", None):
+        column = "joint" if whose == "model" else "axis"
+        found = truearm.inverse(FANUC, p, R, seed_joints=q[0], joints=whose, out=tmp_path / "ik.csv")
+        assert found.joints == pytest.approx(q, abs=1e-7)
+        line = truearm.lines(FANUC, (0.45, 0.0, 0.3), size=(0.1, 0.1, 0.1), joints=whose, out=tmp_path / "lines.csv")
+        for file, joints in (("ik.csv", found.joints), ("lines.csv", line.joints)):
+            written = [[float(row[f"{column}_{i} [deg]"]) for i in range(1, 7)] for row in rows(tmp_path / file)]
+            expected = joints if column == "joint" else shown(joints)
+            assert np.radians(written) == pytest.approx(expected, abs=1e-12), (whose, file)
+    truearm.lines("irb120", (0.35, 0.0, 0.4), size=(0.05, 0.05, 0.05), out=tmp_path / "plain.csv")
+    assert list(rows(tmp_path / "plain.csv")[0])[1] == "joint_1 [deg]"
 
 
 def test_the_hexapods_sheet_and_steps_are_the_controllers(tmp_path: Path) -> None:
@@ -258,11 +231,6 @@ def test_the_hexapods_sheet_and_steps_are_the_controllers(tmp_path: Path) -> Non
     assert f"joints as the controller shows them {first}" in steps.read_text()
 
 
-def test_a_robot_that_counts_as_its_model_is_written_as_ever(tmp_path: Path) -> None:
-    truearm.lines("irb120", (0.35, 0.0, 0.4), size=(0.05, 0.05, 0.05), out=tmp_path / "lines.csv")
-    assert list(rows(tmp_path / "lines.csv")[0])[1] == "joint_1 [deg]"
-
-
 # -- frames --------------------------------------------------------------------------------------------------
 
 
@@ -274,18 +242,24 @@ def turned() -> Robot:
     return replace(load_robot("irb120"), controller=controller)
 
 
-def test_poses_in_the_controllers_frame_are_of_its_flange() -> None:
+def test_poses_in_the_controllers_frame_are_of_its_flange(tmp_path: Path) -> None:
     robot, q = turned(), np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0]])
     p, R = robot.forward(q)
     there, its = robot.forward(q, frame="controller")
     flange = p + R[:, :, 2] * 0.05
     assert there == pytest.approx((flange - [0.1, 0.0, 0.2]) * [-1, -1, 1])
     assert its[0] == pytest.approx(np.diag([-1.0, -1.0, 1.0]) @ R[0] @ [[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    (tmp_path / "robot.yaml").write_text(robot_text(robot))
+    assert read_robot(tmp_path / "robot.yaml").controller.flange == robot.controller.flange
     found = robot.inverse(there, its, frame="controller", seed=q)
     assert found.joints == pytest.approx(q, abs=1e-7)
     step = 1e-6
     rates = (robot.forward(q + np.eye(1, 6) * step, frame="controller")[0] - there) / step
     assert robot.jacobian(q, frame="controller")[0, :3, 0] == pytest.approx(rates[0], abs=1e-5)
+    aimed = robot.with_frames(Transform((1.0, 2.0, 3.0)), {"tip": (0.1, 0.0, 0.2)})
+    base, _ = aimed.forward(q, target="tip")
+    there, _ = aimed.forward(q, frame="controller", target="tip")
+    assert there == pytest.approx((base - [0.1, 0, 0.2]) * [-1, -1, 1])
 
 
 def test_poses_in_the_models_frame_are_said_to_be() -> None:
@@ -294,18 +268,10 @@ def test_poses_in_the_models_frame_are_said_to_be() -> None:
     (said,) = truearm.inverse(robot, p, R, seed_joints=q[0]).warnings
     assert (said.code, said.level) == ("model-frame", "note")
     assert "for poses that the pendant shows use `frame=controller`" in said.message
-    assert not truearm.inverse(
-        robot, *robot.forward(q, frame="controller"), seed_joints=q[0], frame="controller"
-    ).warnings
+    there = robot.forward(q, frame="controller")
+    assert not truearm.inverse(robot, *there, seed_joints=q[0], frame="controller").warnings
     assert not truearm.inverse(robot, p, R, seed_joints=q[0], frame="world").warnings
     assert not truearm.inverse("irb120", p, R, seed_joints=q[0]).warnings
-
-
-def test_a_target_is_where_it_is_in_the_controllers_base() -> None:
-    robot = turned().with_frames(Transform((1.0, 2.0, 3.0)), {"tip": (0.1, 0.0, 0.2)})
-    q = np.zeros((1, 6))
-    base, _ = robot.forward(q, target="tip")
-    assert robot.forward(q, frame="controller", target="tip")[0] == pytest.approx((base - [0.1, 0, 0.2]) * [-1, -1, 1])
 
 
 def test_a_urdf_of_ros_industrial_knows_the_controllers_base(tmp_path: Path) -> None:
@@ -332,26 +298,17 @@ def test_a_urdf_of_ros_industrial_knows_the_controllers_base(tmp_path: Path) -> 
     assert load_robot(tmp_path / "ur.urdf").controller == Controller()
 
 
-def test_a_calibrated_robot_file_keeps_its_controller(tmp_path: Path) -> None:
-    robot = turned()
-    (tmp_path / "robot.yaml").write_text(robot_text(robot))
-    assert read_robot(tmp_path / "robot.yaml").controller.flange == robot.controller.flange
-
-
 # -- what is shown -------------------------------------------------------------------------------------------
 
 
-def test_a_robot_without_a_controller_shows_its_models_flange() -> None:
+def test_joints_are_shown_of_the_controller_where_it_is_known() -> None:
     said = truearm.show(UNKNOWN, joint_positions=np.zeros(5))
     assert any("does not say where its controller has its frames" in line for line in said.lines())
     assert said.summary()["at"]["joints"] == {"model": [0.0] * 5}
     assert truearm.show(UNKNOWN).summary()["at"] is None
-
-
-def test_joints_of_the_model_are_shown_when_they_are_said_to_be() -> None:
     q = np.radians([10.0, 20.0, -50.0, -40.0, -50.0, -60.0])
-    said = truearm.show(FANUC, joint_positions=q, joints_are="model").summary()["at"]["joints"]
-    assert said["controller"] == pytest.approx([10, 20, 30, 40, 50, 60])
+    joints = truearm.show(FANUC, joint_positions=q, joints_are="model").summary()["at"]["joints"]
+    assert joints["controller"] == pytest.approx([10, 20, 30, 40, 50, 60])
 
 
 # -- refused -------------------------------------------------------------------------------------------------
@@ -364,59 +321,27 @@ def headed(folder: Path, *names: str) -> Path:
     return file
 
 
-REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
-    "both kinds": (
-        lambda folder: truearm.load_data(headed(folder, "joint_1", "axis_2")),
-        r"a file has joint positions of one kind; got 'joint_1, axis_2'.*Keep the columns of one kind",
-    ),
-    "a gap": (
-        lambda folder: truearm.load_data(headed(folder, "axis_1", "axis_3")),
-        r"the column axis_2 is missing; got 'axis_1, axis_3'; allowed: axis_1, axis_2",
-    ),
-    "no mapping": (
-        lambda folder: truearm.check(UNKNOWN, headed(folder, *(f"axis_{i}" for i in range(1, 6)))),
-        r"data.csv, column axis_1: it is not known how the controller of katana450 counts the joints.*under controller",
-    ),
-    "another count": (
-        lambda folder: truearm.check(FANUC, headed(folder, "axis_1")),
-        "Give one column axis_i for each joint",
-    ),
-    "unconverted": (
-        lambda folder: truearm.load_data(headed(folder, "axis_1")).postures,
-        r"the joint positions are the controller's.*truearm.load_data\(data, robot\)",
-    ),
-    "an unknown kind": (
-        lambda _: Dataset.of([[0.0]], [[1.0, 2, 3]], joints_are="robot"),  # type: ignore[arg-type]
-        "joints_are: there is no such kind of joint positions; got 'robot'; allowed: model, controller, converted",
-    ),
-    "plan": (
-        lambda _: truearm.plan(UNKNOWN, poses=4, joints="controller"),
-        "joints: it is not known how the controller of katana450 counts",
-    ),
-    "show": (
-        lambda _: truearm.show(UNKNOWN, joint_positions=np.zeros(5), joints_are="controller"),
-        "joints_are: it is not known how the controller of katana450 counts",
-    ),
-    "show short": (lambda _: truearm.show(FANUC, joint_positions=[0.0, 1.0]), r"joint_positions: .*"),
-    "frame": (
-        lambda _: load_robot(UNKNOWN).forward(np.zeros(5), frame="controller"),
-        "frame: it is not known where the controller of katana450 has its frames.*Say under controller",
-    ),
-    "part of a pose": (
-        lambda _: turned().inverse([[0.3, 0, 0.3]], frame="controller", orientation="free"),
-        "orientation: the controller's flange is not the model's.*`frame=base`",
-    ),
-}
+NOT_KNOWN = "it is not known how the controller of katana450 counts the joints"
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_refused(case: str, tmp_path: Path) -> None:
-    call, words = REFUSED[case]
-    with pytest.raises(InputError) as refused:
-        call(tmp_path)
-    assert re.search(words, str(refused.value)), str(refused.value)
-
-
-def test_reference_points_have_the_joints_of_their_targets(data: Dataset) -> None:
-    with pytest.raises(InputError, match="joints of the reference points are of another kind"):
-        replace(data, references=replace(data, joints_are="controller"))
+def test_what_nobody_knows_of_joints_and_frames_is_refused(tmp_path: Path) -> None:
+    words = "one kind; got 'joint_1, axis_2'.*Keep the columns of one kind"
+    refused(None, words, truearm.load_data, headed(tmp_path, "joint_1", "axis_2"))
+    words = "the column axis_2 is missing; got 'axis_1, axis_3'; allowed: axis_1, axis_2"
+    refused(None, words, truearm.load_data, headed(tmp_path, "axis_1", "axis_3"))
+    every = headed(tmp_path, *(f"axis_{number}" for number in range(1, 6)))
+    refused(None, f"data.csv, column axis_1: {NOT_KNOWN}.*under controller", truearm.check, UNKNOWN, every)
+    one = headed(tmp_path, "axis_1")
+    refused(None, "Give one column axis_i for each joint", truearm.check, FANUC, one)
+    words = r"the joint positions are the controller's.*truearm.load_data\(data, robot\)"
+    refused(None, words, lambda: truearm.load_data(one).postures)
+    words = "no such kind of joint positions; got 'robot'; allowed: model, controller, converted"
+    refused("joints_are", words, Dataset.of, [[0.0]], [[1.0, 2, 3]], joints_are="robot")
+    refused("joints", NOT_KNOWN, truearm.plan, UNKNOWN, poses=4, joints="controller")
+    show, zero = partial(truearm.show, UNKNOWN), np.zeros(5)
+    refused("joints_are", NOT_KNOWN, show, joint_positions=zero, joints_are="controller")
+    refused("joint_positions", "", truearm.show, FANUC, joint_positions=[0.0, 1.0])
+    words = "it is not known where the controller of katana450 has its frames.*Say under controller"
+    refused("frame", words, load_robot(UNKNOWN).forward, zero, frame="controller")
+    words = "the controller's flange is not the model's.*`frame=base`"
+    refused("orientation", words, turned().inverse, [[0.3, 0, 0.3]], frame="controller", orientation="free")

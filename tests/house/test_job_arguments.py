@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.expecting import refused
 from tests.house.examples import EXAMPLES
 from tests.simulated import campaign
 
 import truearm
-from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.fit.bounds import Bounds
@@ -25,6 +25,7 @@ EMPTY = replace(DATA, position=np.full_like(DATA.position, np.nan))
 BOUNDS = Bounds.model_validate(
     {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}, "within": {"nothing": 1.0}}
 )
+TWO_FORMS = ["clearance", "clearance-linear-contact"]
 FIXTURE = (0.22, 0.0, 0.1, -0.5)
 
 
@@ -47,14 +48,10 @@ def device(**given: Any) -> object:
         ("data", "same name", lambda: truearm.calibrate("irb120", replace(DATA, targets=("x", "target_x", "3")))),
         ("bounds", "no free parameter", lambda: truearm.calibrate("irb120", DATA, bounds=BOUNDS)),
         ("bounds", "no such file", lambda: truearm.calibrate("irb120", DATA, bounds="nothing.yaml")),
-        (
-            "effects",
-            "take one of them",
-            lambda: truearm.calibrate("irb120", DATA, effects=["clearance", "clearance-linear-contact"]),
-        ),
+        ("effects", "take one of them", lambda: truearm.calibrate("irb120", DATA, effects=TWO_FORMS)),
+        ("data", "there is no reading", lambda: truearm.check("irb120", EMPTY)),
         ("noise", "nothing can be identified", lambda: plan(noise=0.1)),
         ("poses", "allowed: 4 or more", lambda: plan(poses=1)),
-        ("poses", "allowed: 4 or more", lambda: plan(poses=1, candidates=1)),
         ("candidates", "too few", lambda: plan(candidates=5)),
         ("candidates_from", "too few", lambda: plan(candidates_from=DATA.of_configurations(np.arange(5)))),
         ("candidates_from", "number of joints differs", lambda: truearm.plan("li3", poses=12, candidates_from=DATA)),
@@ -67,9 +64,7 @@ def device(**given: Any) -> object:
     ],
 )
 def test_the_parameter_is_named(parameter: str, words: str, call: Callable[[], object]) -> None:
-    with pytest.raises(InputError, match=words) as refusal:
-        call()
-    assert refusal.value.parameter == parameter
+    refused(parameter, words, call)
 
 
 def _inverse(**given: Any) -> Any:
@@ -84,15 +79,19 @@ def test_a_seed_is_an_array_or_rows() -> None:
     )
 
 
-@pytest.mark.parametrize("job", ["check", "calibrate", "validate", "distances", "axes"])
-def test_robot_and_data_the_wrong_way_round(job: str, tmp_path: Path) -> None:
+def test_robot_and_data_the_wrong_way_round(tmp_path: Path) -> None:
     file = tmp_path / "data.csv"
     file.write_text(csv_text(DATA))
-    with pytest.raises(
-        InputError, match=rf"robot and measurements are exchanged.*Write 'truearm {job} irb120"
-    ) as refusal:
-        getattr(truearm, job)(file, "irb120")
-    assert refusal.value.parameter == "robot"
+    for job in ("check", "calibrate", "validate", "distances", "axes"):
+        words = rf"robot and measurements are exchanged.*Write 'truearm {job} irb120"
+        refused("robot", words, getattr(truearm, job), file, "irb120")
+
+
+def test_a_program_is_restored_once_and_one_configuration_is_singular(tmp_path: Path) -> None:
+    program = EXAMPLES["revert"](tmp_path)["programs"][0]
+    refused("programs", "given twice", truearm.revert, [program, program])
+    robot = EXAMPLES["validate"](tmp_path)["robot"]
+    assert truearm.validate(robot, DATA.of_configurations(np.array([0]))).lines()[1].startswith("On 1 configuration of")
 
 
 def test_an_effect_counts_once() -> None:
@@ -101,45 +100,19 @@ def test_an_effect_counts_once() -> None:
     assert "effects=['gain']" in made.command
 
 
-def test_a_program_is_restored_once(tmp_path: Path) -> None:
-    program = EXAMPLES["revert"](tmp_path)["programs"][0]
-    with pytest.raises(InputError, match="given twice") as refusal:
-        truearm.revert([program, program])
-    assert refusal.value.parameter == "programs"
-
-
-def test_one_configuration_is_singular(tmp_path: Path) -> None:
-    robot = EXAMPLES["validate"](tmp_path)["robot"]
-    assert truearm.validate(robot, DATA.of_configurations(np.array([0]))).lines()[1].startswith("On 1 configuration of")
-
-
-@pytest.mark.parametrize("wrong", [{"prior": -1.0}, {"prior": 10**400}, {"nominal": np.nan}])
-def test_a_number_is_named_beside_what_it_belongs_to(wrong: dict[str, Any]) -> None:
+def test_a_number_is_named_beside_what_it_belongs_to() -> None:
     good: dict[str, Any] = {"name": "a", "unit": "m", "group": "geometry", "nominal": 0.0, "prior": 1.0, "value": 0.0}
-    (parameter,) = wrong
-    with pytest.raises(InputError, match=f"^a, {parameter}: the number") as refusal:
-        Parameter(**{**good, **wrong})
-    assert refusal.value.parameter == parameter
+    for parameter, number in (("prior", -1.0), ("prior", 10**400), ("nominal", np.nan)):
+        refused(parameter, f"^a, {parameter}: the number", Parameter, **{**good, parameter: number})
 
 
-@pytest.mark.parametrize(
-    ("came", "shown"),
-    [
+def test_what_came_is_shown_as_it_is() -> None:
+    for came, shown in (
         (None, "got None;"),
         (b"x", "got b'x';"),
         (np.str_("irb12"), "got 'irb12';"),
         (object(), "got an object of type object;"),
         (np.array([1, 2]), "got an object of type ndarray of 2 that holds int64;"),
         (np.array(1), "got an object of type ndarray that holds int64;"),
-    ],
-)
-def test_what_came_is_shown_as_it_is(came: Any, shown: str) -> None:
-    with pytest.raises(InputError) as refusal:
-        truearm.calibrate(came, DATA)
-    assert shown in str(refusal.value)
-
-
-def test_data_without_a_reading_are_not_checked() -> None:
-    with pytest.raises(InputError, match="there is no reading") as refusal:
-        truearm.check("irb120", EMPTY)
-    assert refusal.value.parameter == "data"
+    ):
+        refused(None, shown, truearm.calibrate, came, DATA)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.expecting import refused
 from typer.testing import CliRunner
 
 import truearm
@@ -18,11 +19,11 @@ from truearm.engine.base.units import from_si, to_si
 from truearm.engine.command.kinds import Choice, Number, Whole
 from truearm.engine.command.options import Commands, command_of
 from truearm.engine.command.request import Option, Request, flag_of
+from truearm.engine.command.texts import read_region
 
 REQUESTS: dict[str, type[Request]] = {
     job: getattr(truearm, job).request for job in JOBS if hasattr(getattr(truearm, job), "request")
 }
-OPTIONS = [(job, name) for job, request in REQUESTS.items() for name, _ in request.options()]
 
 
 def declared(job: str, name: str) -> Option:
@@ -41,35 +42,33 @@ def in_si(kind: Number | Whole, number: float) -> float:
     return to_si(number, kind.at_edges.partition("/")[0]) if kind.is_converted else number
 
 
-@pytest.mark.parametrize(("job", "name"), OPTIONS)
-def test_what_is_out_of_range_is_refused_with_what_is_allowed(job: str, name: str) -> None:
-    kind = declared(job, name).kind
-    if isinstance(kind, Number | Whole):
-        for number in beyond(kind):
+@pytest.mark.parametrize("job", REQUESTS)
+def test_what_is_out_of_range_is_refused_with_what_is_allowed(job: str) -> None:
+    for name, one in REQUESTS[job].options():
+        wrong: list[Any] = ["nothing-of-this-name"] if isinstance(one.kind, Choice) else []
+        if isinstance(one.kind, Number | Whole):
+            wrong = [in_si(one.kind, n) if isinstance(one.kind, Number) else int(n) for n in beyond(one.kind)]
+        for value in wrong:
             with pytest.raises(InputError) as refusal:
-                kind.check(in_si(kind, number) if isinstance(kind, Number) else int(number), name)
-            assert refusal.value.parameter == name
-            assert refusal.value.allowed
-            if isinstance(kind, Number) and number:
-                assert f"{number:g}" in str(refusal.value.came)
-    elif isinstance(kind, Choice):
-        with pytest.raises(InputError) as refusal:
-            kind.check("nothing-of-this-name", name)
-        assert refusal.value.parameter == name
-        assert refusal.value.allowed
-    assert kind.metavar or declared(job, name).word == "" or kind.typed is bool
+                one.kind.check(value, name)
+            assert (refusal.value.parameter, bool(refusal.value.allowed)) == (name, True), (job, name, value)
+            if isinstance(one.kind, Number) and value:
+                shown = from_si(value, one.kind.at_edges.partition("/")[0]) if one.kind.is_converted else value
+                assert f"{shown:g}" in str(refusal.value.came), (job, name, value)
+        assert one.kind.metavar or one.word == "" or one.kind.typed is bool, (job, name)
 
 
-@pytest.mark.parametrize(("job", "name"), OPTIONS)
-def test_a_default_is_typed_and_read_again(job: str, name: str) -> None:
-    one, default = declared(job, name), REQUESTS[job].default(name)
-    if default in (None, ()) or callable(default) or not one.in_command or one.kind.typed is bool or one.needed:
-        assert one.help.endswith(".") or not one.in_command
-        return
-    (text,) = one.kind.typed_again(default)
-    read: Any = one.kind.read(one.kind.typed(text), name)
-    again = one.kind.check(read, name)
-    assert again == (pytest.approx(default, rel=1e-15) if isinstance(default, float) else type(again)(default))
+@pytest.mark.parametrize("job", REQUESTS)
+def test_a_default_is_typed_and_read_again(job: str) -> None:
+    for name, one in REQUESTS[job].options():
+        default = REQUESTS[job].default(name)
+        assert one.help.endswith(".") or not one.in_command, (job, name)
+        if default in (None, ()) or callable(default) or not one.in_command or one.kind.typed is bool or one.needed:
+            continue
+        (text,) = one.kind.typed_again(default)
+        again = one.kind.check(one.kind.read(one.kind.typed(text), name), name)
+        same = pytest.approx(default, rel=1e-15) if isinstance(default, float) else type(again)(default)
+        assert again == same, (job, name)
 
 
 def declared_apart() -> tuple[dict[str, set[Any]], dict[str, set[str]]]:
@@ -107,7 +106,7 @@ TWICE = dict(  # noqa: C408 - a name in quotes goes with the job of that name, w
 ) | {"--program": "a path is written in several languages", "--target": "one target, or several"}
 
 
-OLD = [(job, name, declared(job, name).formerly) for job, name in OPTIONS if declared(job, name).formerly]
+OLD = [(job, name, one.formerly) for job in REQUESTS for name, one in REQUESTS[job].options() if one.formerly]
 
 
 @pytest.mark.parametrize(("job", "name", "old"), OLD)
@@ -134,6 +133,9 @@ def test_units_are_those_at_the_edges() -> None:
     assert Number("mm").typed_again(0.005) == ["5"]
     assert from_si(Number("deg").read(90.0, "x"), "deg") == 90.0
     assert Number("%").read(50.0, "x") == 50.0
+    assert np.ravel(read_region("300..600, -200..200,100..400") or []) == pytest.approx([0.3, 0.6, -0.2, 0.2, 0.1, 0.4])
+    for text in ("300..600", "300..600,1..2,3", "300..x,1..2,3..4"):
+        refused("region", "three ranges in mm belong here", read_region, text)
 
 
 def test_a_result_keeps_what_was_asked_for_whatever_becomes_of_it() -> None:

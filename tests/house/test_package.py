@@ -70,14 +70,10 @@ def test_a_calibration_imports_neither_scipy_optimize_nor_plotly() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_unknown_names_of_the_package_are_refused() -> None:
-    import truearm
-
+def test_a_job_of_a_group_has_a_short_name_in_its_namespace_and_unknown_names_are_refused() -> None:
+    for name in truearm.JOBS:
+        space, _, short = name.partition("_")
+        if space in SPACES:
+            assert getattr(getattr(truearm, SPACES[space]), short) is getattr(truearm, name)
     with pytest.raises(AttributeError, match="has no attribute 'calibrat'"):
         truearm.calibrat  # noqa: B018
-
-
-@pytest.mark.parametrize("name", [one for one in truearm.JOBS if one.startswith(("import_", "hexapod_", "iso9283_"))])
-def test_a_job_of_a_group_has_a_short_name_in_its_namespace(name: str) -> None:
-    space, _, short = name.partition("_")
-    assert getattr(getattr(truearm, SPACES[space]), short) is getattr(truearm, name)

@@ -7,10 +7,12 @@ import io
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.expecting import refused
 from tests.house.examples import EXAMPLES
 from tests.simulated import campaign, more_of
 
@@ -22,18 +24,21 @@ from truearm.engine.data.readers.canonical import csv_text, read_csv
 from truearm.engine.document.records import Record
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import is_intact
+from truearm.engine.robot.robot_file.writing import robot_text
 
 #: Jobs that simulate themselves, in their examples.
 SIMULATING = {
-    "simulate",
-    "simulate_inclinometers",
-    "iso9283_simulate",
-    "measure",
-    "lines",
-    "study",
-    "fleet",
-    "example",
-    "demo",
+    *(
+        "simulate",
+        "simulate_inclinometers",
+        "iso9283_simulate",
+        "measure",
+        "lines",
+        "study",
+        "fleet",
+        "example",
+        "demo",
+    ),
 }
 #: They tell nothing of what they read: it goes back, or is only looked at for its layout.
 SILENT = {"revert", "import_guess"}
@@ -183,13 +188,12 @@ def test_what_commands_write_of_simulated_measurements_has_the_mark(tmp_path: Pa
         assert {row["simulated"] for row in rows} == {"yes"}, name
 
 
-@pytest.mark.parametrize("device", ["two-spheres", "two-sockets", "ballbar", "drawn-circle"])
-def test_measurements_against_fixtures_have_the_mark_and_are_read_again(device: str, tmp_path: Path) -> None:
-    out = tmp_path / "data.csv"
-    made = truearm.simulate("irb120", truth="random", poses=4, device=device, seed=1, out=out)
-    assert told(made)
-    assert told(truearm.load_data(out))
-    assert csv_text(read_csv(out)) == out.read_text()
+def test_measurements_against_fixtures_have_the_mark_and_are_read_again(tmp_path: Path) -> None:
+    for device in ("two-spheres", "two-sockets", "ballbar", "drawn-circle"):
+        out = tmp_path / f"{device}.csv"
+        assert told(truearm.simulate("irb120", truth="random", poses=4, device=device, seed=1, out=out)), device
+        assert told(truearm.load_data(out)), device
+        assert csv_text(read_csv(out)) == out.read_text(), device
 
 
 # -- the file of measurements -------------------------------------------------------------------------------------
@@ -209,16 +213,9 @@ def test_the_mark_stays_with_every_row(text: str, tmp_path: Path) -> None:
     file.write_text("\n".join([header, *(row.removesuffix("yes") for row in rows)]) + "\n")
     assert not read_csv(file).simulated
     file.write_text("\n".join([without_mark(header), *rows]) + "\n")  # pasted below the header of real measurements
-    with pytest.raises(InputError, match="as many cells as the header"):
-        read_csv(file)
-
-
-def test_a_mark_that_says_neither_is_refused(text: str, tmp_path: Path) -> None:
-    file = tmp_path / "data.csv"
+    refused(None, "as many cells as the header", read_csv, file)
     file.write_text(text.replace(",yes", ",perhaps", 1))
-    with pytest.raises(InputError, match="does not say whether a virtual instrument") as refusal:
-        read_csv(file)
-    assert "line 2, column simulated" in str(refusal.value)
+    refused(None, "line 2, column simulated.*does not say whether a virtual instrument", read_csv, file)
 
 
 def test_the_mark_goes_through_what_users_do(text: str, tmp_path: Path) -> None:
@@ -230,10 +227,10 @@ def test_the_mark_goes_through_what_users_do(text: str, tmp_path: Path) -> None:
         assert csv_text(data) == content
         assert data.of_configurations([0, 2]).simulated is mark
         mapping = tmp_path / "mapping.yaml"
+        columns = [f"joint_{number} [deg]" for number in range(1, 7)]
         mapping.write_text(
             "truearm: truearm-mapping/1\nlength_unit: mm\nconfiguration: {column: configuration}\n"
-            "joints: {columns: ['joint_1 [deg]', 'joint_2 [deg]', 'joint_3 [deg]', 'joint_4 [deg]', 'joint_5 [deg]', "
-            "'joint_6 [deg]'], unit: deg}\n"
+            f"joints: {{columns: {columns}, unit: deg}}\n"
             "readings: [{target_column: target, x: 'x [mm]', y: 'y [mm]', z: 'z [mm]'}]\n"
         )
         assert told(truearm.import_table(file, mapping)) is mark
@@ -251,8 +248,7 @@ def calibrated() -> tuple[Robot, Dataset]:
     """A robot that was calibrated with simulated measurements, and more of the same twin that are not marked."""
     twin, data = campaign("irb120", 30, 1e-5, 5)
     found = truearm.calibrate("irb120", data, model="offsets").robot
-    more = more_of(twin, 8, 1e-5, 6)
-    return found, Dataset(**{**vars(more), "simulated": False})
+    return found, replace(more_of(twin, 8, 1e-5, 6), simulated=False)
 
 
 def test_a_robot_keeps_the_mark_in_its_files(calibrated: tuple[Robot, Dataset], tmp_path: Path) -> None:
@@ -271,18 +267,11 @@ def test_a_robot_keeps_the_mark_in_its_files(calibrated: tuple[Robot, Dataset], 
             assert len(re.findall('SIMULATED: |"simulated": true', made.text)) == marks
     assert truearm.load_robot(tmp_path / "urdf-1.urdf").simulated
     assert not truearm.load_robot(tmp_path / "urdf-0.urdf").simulated
-
-
-def test_a_calibration_without_its_mark_is_not_as_it_was_written(
-    calibrated: tuple[Robot, Dataset], tmp_path: Path
-) -> None:
-    from truearm.engine.robot.robot_file.writing import robot_text
-
     file = tmp_path / "calibrated.yaml"
-    file.write_text(robot_text(calibrated[0]))
+    file.write_text(robot_text(robot))
     assert is_intact(truearm.load_robot(file))
     file.write_text(file.read_text().replace("simulated: true\n", ""))
-    assert not is_intact(truearm.load_robot(file))
+    assert not is_intact(truearm.load_robot(file))  # without its mark it is not as it was written
 
 
 def test_of_a_robot_and_measurements_it_is_said_which_are_simulated(calibrated: tuple[Robot, Dataset]) -> None:
@@ -292,13 +281,10 @@ def test_of_a_robot_and_measurements_it_is_said_which_are_simulated(calibrated: 
     assert judged.lines()[0] == "SIMULATED: the robot's parameters come from measurements of a virtual instrument."
     alone = truearm.calibrate("irb120", data, model="offsets", train="all").robot
     assert not alone.simulated
-    marked = Dataset(**{**vars(data), "simulated": True})
+    marked = replace(data, simulated=True)
     assert truearm.validate(alone, marked).summary()["simulated_parts"] == ["data"]
     assert truearm.validate(robot, marked).summary()["simulated_parts"] == ["data", "robot"]
-
-
-def test_real_measurements_do_not_wash_a_robot_clean(calibrated: tuple[Robot, Dataset]) -> None:
-    robot, data = calibrated
+    # real measurements do not wash a robot clean
     again = truearm.calibrate(robot, data, model="frames", train="all")
     assert again.summary()["simulated_parts"] == ["robot"]
     assert again.robot.simulated

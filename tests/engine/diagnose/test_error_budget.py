@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.expecting import known
 from tests.simulated import campaign
 
 from truearm.calibration.parts import budget_block
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import table_motion, without_table_motion
-from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
+from truearm.engine.diagnose.error_budget import ErrorBudget, Source, error_budget
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.document.document import held_by, lines_of
 from truearm.engine.fit.fit import Fit, identify
@@ -53,15 +54,11 @@ def judged(
         data = replace(data, sigma=None if declared is None else declared * data.sigma)
     first, rest = (data.of_configurations(part) for part in np.split(np.arange(len(joints)), [poses * visits]))
     fit = identify(ROBOT, first, MODEL["geometric"])
-    budget = error_budget(fit, data, first, rest)
-    assert budget is not None
-    return budget, fit, twin, rest
+    return known(error_budget(fit, data, first, rest)), fit, twin, rest
 
 
-def square(budget: ErrorBudget, source: str) -> float:
-    share = next(share for share in budget.shares if share.source == source)
-    assert share.square is not None
-    return share.square
+def square(budget: ErrorBudget, source: Source) -> float:
+    return known(budget.share(source).square)
 
 
 def of_the_model(fit: Fit, twin: Twin, data: Dataset) -> float:
@@ -116,9 +113,8 @@ def test_the_share_of_the_parameters_is_what_they_do_at_unseen_poses() -> None:
         assert abs(square(budget, "parameters") - is_so) < 3 * budget.share("parameters").deviation
 
 
-@pytest.mark.parametrize("declared", [1.0, None])
-def test_what_the_model_lacks_is_found(declared: float | None) -> None:
-    made = [judged("tracker-triangular", 80, 0.02e-3, seed, declared=declared) for seed in range(3)]
+def test_what_the_model_lacks_is_found() -> None:
+    made = [judged("tracker-triangular", 80, 0.02e-3, n % 3, declared=1.0 if n < 3 else None) for n in range(6)]
     for budget, fit, twin, rest in made:
         true = of_the_model(fit, twin, rest)
         found = square(budget, "model") + square(budget, "parameters")
@@ -147,8 +143,7 @@ def test_repeatability_is_told_from_the_model_where_postures_were_visited_again(
 def test_declared_deviations_that_are_too_large_show_as_a_negative_share() -> None:
     budget, *_ = judged("random", 60, 0.05e-3, 2, declared=2.0)
     share = budget.share("model")
-    assert share.square is not None
-    assert share.square < -3 * share.deviation
+    assert known(share.square) < -3 * share.deviation
     assert share.words.startswith("negative: the training residuals are smaller than the declared deviations")
     assert "; what the model cannot express takes 0." in lines_of([budget_block(budget)])[0]
 
@@ -159,8 +154,7 @@ def test_an_effect_outside_the_training_part_is_a_remainder_that_is_not_explaine
     rest = read(twin, ROBOT.random_configurations(40, rng), 0.02e-3, rng)
     rest = replace(rest, position=rest.position + np.array([0.5e-3, 0.0, 0.0]))
     fit = identify(ROBOT, data, MODEL["geometric"])
-    budget = error_budget(fit, data, data, rest)
-    assert budget is not None
+    budget = known(error_budget(fit, data, data, rest))
     assert not budget.remainder_is_chance
     assert square(budget, "remainder") == pytest.approx(0.5e-3**2, rel=0.1)
     assert budget.share("remainder").words.startswith("not explained: the robot errs more")
@@ -170,40 +164,25 @@ def test_an_effect_outside_the_training_part_is_a_remainder_that_is_not_explaine
 def test_nothing_held_out_leaves_no_remainder() -> None:
     _, data = campaign("irb120", 40, 0.02e-3, 4)
     fit = identify(ROBOT, data, MODEL["geometric"])
-    budget = error_budget(fit, data, data, None, expected_error(fit))
-    assert budget is not None
+    budget = known(error_budget(fit, data, data, None, expected_error(fit)))
     assert not budget.held_out
     assert {share.source for share in budget.shares} == {"instrument", "table", "repeatability", "model", "parameters"}
     assert budget.square == pytest.approx(sum(share.square or 0.0 for share in budget.shares))
     assert "mm, to expect at configurations like these" in lines_of([budget_block(budget)])[0]
-    assert budget.workspace is not None
     expected = expected_error(fit).overall
-    assert sum(share.square or 0.0 for share in budget.workspace) == pytest.approx(expected.mean**2, rel=0.6)
+    assert sum(share.square or 0.0 for share in known(budget.workspace)) == pytest.approx(expected.mean**2, rel=0.6)
 
 
-def test_lengths_have_a_budget_too() -> None:
+@pytest.mark.parametrize(("device", "count", "kind"), [("ballbar", 120, "length"), ("point", 60, "position")])
+def test_lengths_and_positions_before_a_fixture_have_a_budget_too(device: str, count: int, kind: str) -> None:
     rng = np.random.default_rng(5)
-    twin = truth_twin(ROBOT, "random", rng)
-    data = measured_with(named_device("ballbar"), ROBOT, twin, 120, rng)
-    first, rest = data.of_configurations(range(90)), data.of_configurations(range(90, 120))
-    budget = error_budget(identify(ROBOT, first, MODEL["geometric"]), data, first, rest)
-    assert budget is not None
-    assert budget.kind == "length"
-    assert data.sigma is not None
-    assert square(budget, "instrument") == pytest.approx(data.sigma[0] ** 2)
-    assert budget.remainder_is_chance
+    data = measured_with(named_device(device), ROBOT, truth_twin(ROBOT, "random", rng), count, rng)
+    first, rest = data.of_configurations(range(3 * count // 4)), data.of_configurations(range(3 * count // 4, count))
+    budget = known(error_budget(identify(ROBOT, first, MODEL["geometric"]), data, first, rest))
+    assert (budget.kind, budget.remainder_is_chance) == (kind, True)
+    sigma = known(data.sigma)[0]
+    assert square(budget, "instrument") == pytest.approx(sigma**2 * (1 if kind == "length" else 3))
     assert budget.share("table").square is None
-
-
-def test_positions_before_a_fixture_have_a_budget() -> None:
-    rng = np.random.default_rng(5)
-    data = measured_with(named_device("point"), ROBOT, truth_twin(ROBOT, "random", rng), 60, rng)
-    first, rest = data.of_configurations(range(45)), data.of_configurations(range(45, 60))
-    budget = error_budget(identify(ROBOT, first, MODEL["geometric"]), data, first, rest)
-    assert budget is not None
-    assert budget.kind == "position"
-    assert square(budget, "instrument") == pytest.approx(3 * 0.05e-3**2)
-    assert budget.remainder_is_chance
 
 
 def on_a_moving_table(noise: float) -> tuple[Dataset, Array]:
@@ -227,28 +206,20 @@ def on_a_moving_table(noise: float) -> tuple[Dataset, Array]:
     return replace(data, position=position, references=beside), data.position
 
 
-def test_what_is_left_of_the_tables_motion() -> None:
+def test_what_is_left_of_the_tables_motion_has_a_share() -> None:
     moving, true = on_a_moving_table(0.01e-3)
     still = without_table_motion(moving)
-    motion = table_motion(still)
-    assert motion is not None
+    motion = known(table_motion(still))
     off = still.position - true
     off -= off.mean(axis=0)  # where the points are on average is not known better than their mean
     assert motion.left == pytest.approx(float(np.mean(np.sum(off**2, axis=1))), rel=0.2)
-    assert motion.removed == pytest.approx(
-        float(np.sqrt(np.mean(np.sum((moving.position - still.position) ** 2, axis=1)))), rel=1e-6
-    )
+    removed = np.sqrt(np.mean(np.sum((moving.position - still.position) ** 2, axis=1)))
+    assert motion.removed == pytest.approx(removed, rel=1e-6)
     assert table_motion(replace(still, references=None)) is None
-
-
-def test_the_tables_motion_has_a_share() -> None:
-    moving, _ = on_a_moving_table(0.01e-3)
     still = without_table_motion(replace(moving, sigma=np.full(len(moving.target), 1e-6)))
     first, rest = still.of_configurations(range(50)), still.of_configurations(range(50, 80))
-    budget = error_budget(identify(ROBOT, first, MODEL["geometric"]), still, first, rest)
-    assert budget is not None
+    budget = known(error_budget(identify(ROBOT, first, MODEL["geometric"]), still, first, rest))
     share = budget.share("table")
-    assert share.square is not None
-    assert share.square > 10 * abs(square(budget, "instrument"))
+    assert known(share.square) > 10 * abs(square(budget, "instrument"))
     assert "after a motion of 0.51 mm" in share.words
     assert budget.removed is not None

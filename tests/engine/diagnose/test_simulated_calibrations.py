@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.expecting import known, refused
 from tests.simulated import campaign
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.parts import simulated_block
-from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations, check_linear, simulated_calibrations
 from truearm.engine.document.document import lines_of
@@ -57,8 +57,8 @@ def test_where_all_is_linear_it_agrees_with_the_covariance(repeat: float, redund
     ratio = (found.deviation / found.linear_deviation)[own]
     assert 0.85 < ratio.min() < ratio.max() < 1.15
     assert 0.935 < found.coverage[own].mean() < 0.965
-    assert found.held_out is not None
-    assert found.held_out.mean == pytest.approx(found.held_out.linear_mean, rel=0.06)
+    held_out = known(found.held_out)
+    assert held_out.mean == pytest.approx(held_out.linear_mean, rel=0.06)
     assert (found.workspace is None) == (redundancy == "drop")
     assert check_linear(fit, found) == []
 
@@ -95,22 +95,21 @@ def test_lengths_alone_are_simulated_too() -> None:
     fit = identify(ROBOT, data, MODEL["geometric"])
     found = simulated_calibrations(fit, data, data, 100, priors=True)
     assert found.settled == 100
-    assert found.held_out is not None
-    assert found.held_out.mean == pytest.approx(found.held_out.linear_mean, rel=0.3)
-
-
-def lost(fit: Fit, data: Dataset, factor: float, settled: int) -> SimulatedCalibrations:
-    found = simulated_calibrations(fit, data, data, 100, priors=True)
-    return replace(found, error=factor * found.error[:settled], stated=found.stated[:settled])
+    assert known(found.held_out).mean == pytest.approx(known(found.held_out).linear_mean, rel=0.3)
 
 
 def test_intervals_that_are_too_narrow_and_lost_trials_are_told() -> None:
     _, data = read()
     fit = identify(ROBOT, data, MODEL["geometric"])
-    codes = [(n.code, n.level) for n in check_linear(fit, lost(fit, data, 2.5, 100))]
+    found = simulated_calibrations(fit, data, data, 100, priors=True)
+
+    def lost(factor: float, settled: int) -> SimulatedCalibrations:
+        return replace(found, error=factor * found.error[:settled], stated=found.stated[:settled])
+
+    codes = [(n.code, n.level) for n in check_linear(fit, lost(2.5, 100))]
     assert codes == [("intervals-too-narrow", "warning")]
-    assert [n.code for n in check_linear(fit, lost(fit, data, 1.0, 90))] == ["trials-lost"]
-    nothing = lost(fit, data, 1.0, 0)
+    assert [n.code for n in check_linear(fit, lost(1.0, 90))] == ["trials-lost"]
+    nothing = lost(1.0, 0)
     assert [n.code for n in check_linear(fit, nothing)] == ["trials-lost"]
     assert "none of 100 simulated calibrations" in lines_of([simulated_block(nothing, fit.robot)])[0]
 
@@ -140,23 +139,15 @@ def test_the_job_puts_both_intervals_side_by_side(tmp_path: Path) -> None:
     assert "monte_carlo" not in calibrate(ROBOT, data).result()
 
 
-def test_what_cannot_be_simulated_is_refused() -> None:
+def test_what_cannot_be_simulated_is_refused_and_what_leaves_things_open_is_not_simulated() -> None:
     _, data = read()
-    with pytest.raises(InputError, match="out of range; got 99; allowed: 100 to 100000"):
-        calibrate(ROBOT, data, monte_carlo=99)
-    with pytest.raises(InputError, match=r"other losses are for noise that is not normal.*the loss l1.*`loss`"):
-        calibrate(ROBOT, data, monte_carlo=100, loss="l1")
+    refused(None, "out of range; got 99; allowed: 100 to 100000", calibrate, ROBOT, data, monte_carlo=99)
+    refused(None, "a whole number belongs here", calibrate, ROBOT, data, monte_carlo=1e3)
+    words = r"other losses are for noise that is not normal.*the loss l1.*`loss`"
+    refused(None, words, calibrate, ROBOT, data, monte_carlo=100, loss="l1")
     limits = {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}, "within": {"a_3": 1.0}}
-    with pytest.raises(InputError, match=r"simulated without bounds.*Leave `bounds` out"):
-        calibrate(ROBOT, data, monte_carlo=100, bounds=Bounds.model_validate(limits))
-    with pytest.raises(InputError, match="a whole number belongs here"):
-        calibrate(ROBOT, data, monte_carlo=1e3)  # type: ignore[arg-type]
-
-
-def test_nothing_is_simulated_of_a_fit_that_leaves_things_open() -> None:
-    _, data = read()
+    bounds = Bounds.model_validate(limits)
+    refused(None, r"simulated without bounds.*`bounds` out", calibrate, ROBOT, data, monte_carlo=100, bounds=bounds)
     run = calibrate(ROBOT, data.of_configurations(range(3)), monte_carlo=100)
-    assert run.status.value == "rank-loss"
-    assert run.monte_carlo is None
+    assert (run.status.value, run.monte_carlo, "monte_carlo" in run.result()) == ("rank-loss", None, False)
     assert ("not-simulated", "note") in {(notice.code, notice.level) for notice in run.warnings}
-    assert "monte_carlo" not in run.result()

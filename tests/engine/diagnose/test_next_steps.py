@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.engine.diagnose.test_arrival_lag import ON_A_TRACK
+from tests.expecting import known
 from tests.simulated import campaign
 
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
 from truearm.checking.check import check
+from truearm.checking.checking import DataCheck
 from truearm.engine.base.errors import Notice
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.curves import about_curves
@@ -23,7 +25,7 @@ from truearm.engine.diagnose.next_steps import _after, _end, steps_after_check
 from truearm.engine.diagnose.off_configurations import off_configurations
 from truearm.engine.diagnose.unmodelled import LeftOver, explanation
 from truearm.engine.fit.bounds import Bounds
-from truearm.engine.fit.fit import Status, identify
+from truearm.engine.fit.fit import Fit, Status, identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Payload
@@ -89,18 +91,51 @@ def test_at_the_noise_it_says_stop() -> None:
 def test_a_geometric_model_of_an_elastic_robot_is_told_to_be_elastic() -> None:
     before, after = calibrated(elastic(), "geometric"), calibrated(elastic())
     step = before.next[0]
-    assert step.code == "other-model"
-    assert "`model=elastic`" in step.message
-    assert before.validation is not None
-    assert after.validation is not None
-    old, new = before.validation.position, after.validation.position
-    assert old is not None
-    assert new is not None
-    assert step.gain == pytest.approx(old.mean - new.mean, rel=0.2)
+    assert (step.code, "`model=elastic`" in step.message) == ("other-model", True)
+    old, new = (known(known(run.validation).position).mean for run in (before, after))
+    assert step.gain == pytest.approx(old - new, rel=0.2)
     assert not any(other.code == "measure-again" for other in before.next)  # large where the arm sags, and not wrong
+    assert before.summary()["next"] == [one.summary() for one in before.next]
+    text = before.lines()
+    place = text.index(step.line)
+    assert text[place : place + len(before.next)] == [one.line for one in before.next]
+    assert check("irb120", elastic()).summary()["next"][0]["code"] == "other-model"
+    frames = first(elastic(), "frames")
+    assert (frames.code, "`model=geometric`" in frames.message) == ("other-model", True)
 
 
-def test_a_forgotten_payload_is_named_with_its_mass() -> None:
+def test_a_worn_wrist_is_told_by_its_effect() -> None:
+    for worn, effects in (("hysteresis", ("approach",)), ("backlash", ("backlash", "clearance"))):
+        step = first(elastic(worn=worn))
+        assert step.code == "other-model", worn
+        assert any(f"`effects={name}`" in step.message for name in effects), worn
+
+
+def with_one_reading_off() -> Dataset:
+    position = elastic().position.copy()
+    position[3 * 20 + 1] += [0.0, 0.0, 2e-3]
+    return replace(elastic(), position=position)
+
+
+def test_what_is_off_is_named_with_how_far_and_is_no_instrument_that_moved() -> None:
+    for data, words in (
+        (slipped(elastic(), [(17, 3, 1.0)]), ["joint 3 of configuration 18 looks off by about 1 deg", "`without=18`"]),
+        (with_one_reading_off(), ["target 2 of configuration 21 is off by 2 mm"]),
+        (shifted(elastic(), 20, 21, 3.0), ["configuration 21 is off by 3 mm"]),
+        (shifted(elastic(), 30, 34, 1.0), ["Measure configurations 31 to 34 again", "`without=31,32,33,34`"]),
+    ):
+        run = calibrated(data)
+        step = run.next[0]
+        assert step.code == "measure-again", words
+        assert all(part in step.message for part in words), step.message
+        assert ("joint" in step.message) is words[0].startswith("joint")
+        if words[0].startswith("joint"):
+            assert not {n.code for n in run.warnings} & {"instrument-moved", "joint-zero-jumped", "drift"}
+    step = first(elastic(poses=18))
+    assert (step.code, "13 more" in step.message, step.gain is None) == ("measure-more", True, False)
+
+
+def test_a_forgotten_payload_is_named_with_its_mass_and_missing_masses_are_asked_for() -> None:
     step = first(elastic(), payload=None)
     assert step.code == "give-payload"
     told = float(step.message.split("about ")[1].split(" kg")[0])
@@ -110,63 +145,46 @@ def test_a_forgotten_payload_is_named_with_its_mass() -> None:
     assert other.code == "give-payload"
     assert other.message.startswith("Check what the robot carried")
     assert "instead of 0.3 kg" in other.message
-
-
-@pytest.mark.parametrize(("worn", "effects"), [("hysteresis", ("approach",)), ("backlash", ("backlash", "clearance"))])
-def test_a_worn_wrist_is_told_by_its_effect(worn: str, effects: tuple[str, ...]) -> None:
-    step = first(elastic(worn=worn))
-    assert step.code == "other-model"
-    assert any(f"`effects={name}`" in step.message for name in effects)
-
-
-def test_too_few_configurations_are_told_where_to_measure_more() -> None:
-    step = first(elastic(poses=18))
-    assert step.code == "measure-more"
-    assert "13 more" in step.message
-    assert step.gain is not None
-
-
-def test_a_joint_that_was_written_down_wrong_is_named() -> None:
-    run = calibrated(slipped(elastic(), [(17, 3, 1.0)]))
-    step = run.next[0]
-    assert step.code == "measure-again"
-    assert "joint 3 of configuration 18 looks off by about 1 deg" in step.message
-    assert "`without=18`" in step.message
-    # One row that is far off does not look like an instrument that moved.
-    assert not any(notice.code in ("instrument-moved", "joint-zero-jumped", "drift") for notice in run.warnings)
+    # a robot without masses is asked for them
+    heavy = load_robot("irb120")
+    rigid = replace(heavy, masses=())
+    step = calibrate(rigid, elastic(), model="geometric").next[0]
+    assert step.code == "give-loads"
+    assert "masses" in step.message
+    assert "`payload`" in step.message
 
 
 @pytest.mark.parametrize("of_one", [False, True])
-@pytest.mark.parametrize(("index", "joint"), [(21, 4), (12, 5), (28, 2)])
-def test_a_wrong_sign_of_one_joint_is_named_and_no_other_joint(index: int, joint: int, of_one: bool) -> None:
+def test_a_wrong_sign_of_one_joint_is_named_and_no_other_joint(of_one: bool) -> None:
     data = campaign("irb120", 40, NOISE, 3)[1]
     if of_one:
         data = replace(data.of_readings(data.target == 0), targets=data.targets[:1])
-    size = np.degrees(abs(data.joints[index, joint - 1]))
-    assert size > 5.0
-    joints = data.joints.copy()
-    joints[index, joint - 1] *= -1
-    run = check("irb120", replace(data, joints=joints))
-    (notice,) = run.warnings
-    assert notice.code == "joints-mistaken"
-    assert f"{index + 1} (joint {joint}) fit with the opposite sign of this joint" in notice.message
-    said = " ".join(step.message for step in run.next)
-    assert f"the sign of joint {joint} of configuration {index + 1} looks wrong" in said
-    assert "looks off" not in said
+    for index, joint in ((21, 4), (12, 5), (28, 2)):
+        assert np.degrees(abs(data.joints[index, joint - 1])) > 5.0
+        joints = data.joints.copy()
+        joints[index, joint - 1] *= -1
+        run = check("irb120", replace(data, joints=joints))
+        (notice,) = run.warnings
+        assert notice.code == "joints-mistaken"
+        assert f"{index + 1} (joint {joint}) fit with the opposite sign of this joint" in notice.message
+        said = said_next(run)
+        assert f"the sign of joint {joint} of configuration {index + 1} looks wrong" in said
+        assert "looks off" not in said
 
 
-def test_a_joint_that_is_off_by_far_is_named_with_how_far() -> None:
-    run = check("irb120", slipped(elastic(), [(17, 3, 40.0)]))
-    assert "joint 3 of configuration 18 looks off by about 40 deg" in " ".join(step.message for step in run.next)
+def said_next(run: DataCheck) -> str:
+    return " ".join(step.message for step in run.next)
 
 
-def test_a_slide_that_is_off_is_named_in_mm(tmp_path: Path) -> None:
+def test_a_joint_or_slide_that_is_off_by_far_is_named_with_how_far(tmp_path: Path) -> None:
+    said = said_next(check("irb120", slipped(elastic(), [(17, 3, 40.0)])))
+    assert "joint 3 of configuration 18 looks off by about 40 deg" in said
     (tmp_path / "track.yaml").write_text(ON_A_TRACK, encoding="utf-8")
     robot, rng = load_robot(tmp_path / "track.yaml"), np.random.default_rng(3)
     data = measure(truth_twin(robot, "random", rng), robot.random_configurations(40, rng), NOISE, rng)
     joints = data.joints.copy()
     joints[20, 0] += 0.05
-    said = " ".join(step.message for step in check(robot, replace(data, joints=joints)).next)
+    said = said_next(check(robot, replace(data, joints=joints)))
     assert "joint 1 of configuration 21 looks off by about 50 mm" in said
 
 
@@ -175,11 +193,10 @@ def test_no_joint_is_named_where_two_explain_the_readings_or_none_does() -> None
     joints = data.joints.copy()
     joints[21, 4] = 0.0  # joints 4 and 6 turn about one axis
     straight = measure(twin, joints, 0.3e-3, np.random.default_rng(3))
-    said = " ".join(step.message for step in check("irb120", slipped(straight, [(21, 4, 10.0)])).next)
+    said = said_next(check("irb120", slipped(straight, [(21, 4, 10.0)])))
     assert "configuration 22 is off by" in said
     assert "joint 4" not in said
-    two = slipped(data, [(10, 2, 15.0), (10, 5, -30.0)])
-    said = " ".join(step.message for step in check("irb120", two).next)
+    said = said_next(check("irb120", slipped(data, [(10, 2, 15.0), (10, 5, -30.0)])))
     assert "configuration 11 is off by" in said
     assert "of configuration 11 looks off" not in said
 
@@ -192,27 +209,6 @@ def test_several_rows_are_found_behind_each_other_and_behind_the_wrong_model() -
         assert "`without=8,31,56`" in step.message
         for words in ("joint 2 of configuration 8", "joint 5 of configuration 31", "joint 4 of configuration 56"):
             assert words in step.message
-
-
-def test_one_reading_that_is_off_is_no_joint() -> None:
-    data = elastic()
-    position = data.position.copy()
-    position[3 * 20 + 1] += [0.0, 0.0, 2e-3]
-    step = first(replace(data, position=position))
-    assert step.code == "measure-again"
-    assert "target 2 of configuration 21 is off by 2 mm" in step.message
-
-
-def test_readings_that_no_joint_explains_are_named_with_how_far_they_are_off() -> None:
-    step = first(shifted(elastic(), 20, 21, 3.0))
-    assert "configuration 21 is off by 3 mm" in step.message
-    assert "joint" not in step.message
-
-
-def test_configurations_in_a_row_moved_together() -> None:
-    run = calibrated(shifted(elastic(), 30, 34, 1.0))
-    assert "Measure configurations 31 to 34 again" in run.next[0].message
-    assert "`without=31,32,33,34`" in run.next[0].message
 
 
 def test_a_tracker_that_moved_is_named_with_its_configuration() -> None:
@@ -231,56 +227,25 @@ def test_what_no_effect_explains_is_not_called_noise() -> None:
     assert not any(step.code == "stop" for step in undeclared.next)
 
 
-def test_a_robot_without_masses_is_asked_for_them() -> None:
-    heavy = load_robot("irb120")
-    rigid = replace(heavy, masses=())
-    step = calibrate(rigid, elastic(), model="geometric").next[0]
-    assert step.code == "give-loads"
-    assert "masses" in step.message
-    assert "`payload`" in step.message
-
-
-def test_frames_alone_are_told_what_geometry_gains() -> None:
-    step = first(elastic(), "frames")
-    assert step.code == "other-model"
-    assert "`model=geometric`" in step.message
-
-
-def test_errors_of_the_data_come_before_everything() -> None:
-    data = elastic()
-    steps = check("irb120", replace(data, joints=np.degrees(data.joints))).next
-    assert [step.code for step in steps] == ["mend-data"]
-    assert "unit-angle" in steps[0].message
-
-
-def test_nothing_held_out_is_followed_up() -> None:
+def test_how_the_fit_ended_is_followed_up() -> None:
     run = calibrate("irb120", elastic(), model="elastic", payload=LOAD, train="all")
     assert [step.code for step in run.next] == ["hold-out"]
-
-
-def test_a_value_at_a_bound_is_followed_up() -> None:
     units = {"length": "mm", "angle": "deg"}
     bounds = Bounds.model_validate({"truearm": "truearm-bounds/1", "units": units, "within": {"a_3": 0.01}})
     run = calibrate("irb120", elastic(), model="elastic", payload=LOAD, bounds=bounds)
     assert run.status is Status.AT_BOUND
     assert "widen-bound" in [step.code for step in run.next]
-
-
-def test_rank_loss_asks_for_what_is_not_determined() -> None:
     run = calibrate("irb120", simulate("irb120", truth="random", poses=40, device="plane", seed=3).data)
-    assert run.status is Status.RANK_LOSS
-    assert run.next[0].code == "measure-more"
+    assert (run.status, run.next[0].code) == (Status.RANK_LOSS, "measure-more")
     assert run.fit.unobservable[0] in run.next[0].message
 
 
-def test_warnings_are_pointed_to() -> None:
-    (cure, go_on) = steps_after_check([Notice("joints-not-settled", "Wait longer.")])
-    assert (cure.code, go_on.code) == ("see-warning", "calibrate")
-    assert "joints-not-settled" in cure.message
-    assert [step.code for step in steps_after_check([Notice("missing", "Gaps.", "note")])] == ["calibrate"]
-
-
 def test_a_check_says_what_comes_next() -> None:
+    (cure, go_on) = steps_after_check([Notice("joints-not-settled", "Wait longer.")])
+    assert (cure.code, go_on.code, "joints-not-settled" in cure.message) == ("see-warning", "calibrate", True)
+    assert [step.code for step in steps_after_check([Notice("missing", "Gaps.", "note")])] == ["calibrate"]
+    (mend,) = check("irb120", replace(elastic(), joints=np.degrees(elastic().joints))).next
+    assert (mend.code, "unit-angle" in mend.message) == ("mend-data", True)
     _, rigid = campaign("irb120", 40, NOISE, 3)
     (good,) = check("irb120", rigid).next
     assert good.code == "calibrate"
@@ -307,15 +272,10 @@ def test_steps_are_ordered_by_their_gain_and_three_at_most() -> None:
     assert ordered[0].line == "Next (c): C. Expected gain: 0.2 mm."
     assert ordered[0].summary() == {"code": "c", "message": "C.", "gain_mm": 0.2}
     assert ordered[2].summary()["gain_mm"] is None
-
-
-def test_the_record_holds_the_steps() -> None:
-    run = calibrated(elastic(), "geometric")
-    assert run.summary()["next"] == [step.summary() for step in run.next]
-    text = run.lines()
-    place = text.index(run.next[0].line)
-    assert text[place : place + len(run.next)] == [step.line for step in run.next]
-    assert check("irb120", elastic()).summary()["next"][0]["code"] == "other-model"
+    model, more = NextStep("other-model", "Add it.", 6e-4), NextStep("measure-more", "Measure more.", 6e-5)
+    (step,) = _after([model], [more])  # more configurations come after a model that gains far more
+    assert (step.code, step.message, step.gain) == ("measure-more", "After that: measure more.", None)
+    assert _after([replace(model, gain=1e-4)], [more]) == _after([], [more]) == [more]
 
 
 def test_what_is_left_out_is_left_out_of_everything() -> None:
@@ -327,33 +287,38 @@ def test_what_is_left_out_is_left_out_of_everything() -> None:
     rest = left.without(off.indices)
     assert rest.problem.data.configurations == data.configurations - len(off.indices)
     assert rest.freedom == len(rest.residual) - rest.basis.shape[1]
-    found = explanation(left, off.indices)
-    assert found is not None
-    assert found.cause == "compliance"
+    assert known(explanation(left, off.indices)).cause == "compliance"
     assert left.without(()) is left
 
 
-def test_a_choice_that_tried_everything_does_not_say_that_nobody_can_tell() -> None:
-    data = elastic(poses=14)
-    fit = identify(load_robot("irb120").with_payload(LOAD), data, named_model("elastic"))
-    few = _end(LeftOver.of(fit, data)).message
-    assert "too few readings to tell" in few
+def test_few_configurations_cannot_tell_errors_of_gears() -> None:
+    data = simulate("irb120", truth="gear-errors", poses=25, noise=3e-5, seed=1).data
+    for model, effects in (("geometric", []), ("geometric", ["joint-curve"]), ("auto", [])):
+        (step,) = calibrate("irb120", data, model=model, effects=effects).next
+        assert step.code == "unexplained", (model, effects)
+        assert "no effect known here explains" not in step.message
+        assert "cannot be told from 18 training configurations: measure about 200" in step.message
+
+
+def fitted(poses: int) -> Fit:
+    return identify(load_robot("irb120").with_payload(LOAD), elastic(poses=poses), named_model("elastic"))
+
+
+def test_too_few_readings_are_told_from_a_choice_that_tried_everything_and_from_curves(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    data, fit = elastic(poses=14), fitted(14)
+    assert "too few readings to tell" in _end(LeftOver.of(fit, data)).message
     tried = replace(fit, model=replace(fit.model, name="auto", tried=("backlash",)))
     assert "cross-validation found no other joint effect" in _end(LeftOver.of(tried, data)).message
-
-
-@pytest.mark.parametrize(("model", "effects"), [("geometric", ()), ("geometric", ("joint-curve",)), ("auto", ())])
-def test_few_configurations_cannot_tell_errors_of_gears(model: str, effects: tuple[str, ...]) -> None:
-    data = simulate("irb120", truth="gear-errors", poses=25, noise=3e-5, seed=1).data
-    (step,) = calibrate("irb120", data, model=model, effects=list(effects)).next
-    assert step.code == "unexplained"
-    assert "no effect known here explains" not in step.message
-    assert "cannot be told from 18 training configurations: measure about 200" in step.message
+    monkeypatch.setattr("truearm.engine.diagnose.next_steps.has_curves", lambda _: True)
+    said = _end(LeftOver.of(fit, data)).message
+    assert "The curves leave too few equations" in said
+    assert "too few readings" not in said
 
 
 def test_what_is_not_known_of_curves_is_said() -> None:
-    data = elastic(poses=20)
-    fit = identify(load_robot("irb120").with_payload(LOAD), data, named_model("elastic"))
+    fit = fitted(20)
     tried = replace(fit, model=replace(fit.model, tried=("joint-curve",)))
     curved = replace(fit, model=replace(fit.model, effects=("joint-curve",)))
     assert about_curves(fit, 20).startswith("Errors that follow a joint's angle")
@@ -361,20 +326,3 @@ def test_what_is_not_known_of_curves_is_said() -> None:
     assert "were not looked for" in about_curves(fit, 300)
     assert "tried `joint-curve` and left it out" in about_curves(tried, 300)
     assert about_curves(curved, 300) == ""
-
-
-def test_more_configurations_come_after_a_model_that_gains_far_more() -> None:
-    model, more = NextStep("other-model", "Add it.", 6e-4), NextStep("measure-more", "Measure more.", 6e-5)
-    (step,) = _after([model], [more])
-    assert (step.code, step.message, step.gain) == ("measure-more", "After that: measure more.", None)
-    assert _after([replace(model, gain=1e-4)], [more]) == [more]
-    assert _after([], [more]) == [more]
-
-
-def test_curves_that_leave_few_equations_are_no_lack_of_readings(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = elastic(poses=14)
-    fit = identify(load_robot("irb120").with_payload(LOAD), data, named_model("elastic"))
-    monkeypatch.setattr("truearm.engine.diagnose.next_steps.has_curves", lambda _: True)
-    said = _end(LeftOver.of(fit, data)).message
-    assert "The curves leave too few equations" in said
-    assert "too few readings" not in said

@@ -21,6 +21,7 @@ from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import measure
 
 TURN = (-math.pi, math.pi)
+EVERYWHERE = np.linspace(-180, 180, 90)
 
 
 def curve(amplitudes: dict[int, float], places: Array, shown: tuple[float, float] = TURN) -> FoundCurve:
@@ -53,28 +54,25 @@ def test_a_gap_parts_the_measured_ranges() -> None:
 
 
 def test_its_size_is_that_where_it_was_measured() -> None:
-    assert curve({4: 10.0}, np.linspace(-180, 180, 90)).rms == pytest.approx(
-        math.radians(0.01) / math.sqrt(2), rel=1e-3
-    )
-    assert curve({4: 10.0}, np.linspace(-180, 180, 90)).rms_deviation == pytest.approx(1e-5 / math.sqrt(2), rel=0.01)
+    found = curve({4: 10.0}, EVERYWHERE)
+    assert found.rms == pytest.approx(math.radians(0.01) / math.sqrt(2), rel=1e-3)
+    assert found.rms_deviation == pytest.approx(1e-5 / math.sqrt(2), rel=0.01)
     short = curve({1: 10.0}, np.linspace(-10, 10, 30))  # nearly a straight line of 3.5 mdeg
     assert math.degrees(short.rms) == pytest.approx(0.010 * math.radians(10) / math.sqrt(3), rel=0.02)
 
 
 def test_the_strongest_periods_are_told_with_their_neighbours() -> None:
-    found = curve({1: 3.0, 19: 5.0, 20: 6.0, 21: 5.5, 22: 4.5, 50: 1.0, 58: 0.1}, np.linspace(-180, 180, 90))
+    found = curve({1: 3.0, 19: 5.0, 20: 6.0, 21: 5.5, 22: 4.5, 50: 1.0, 58: 0.1}, EVERYWHERE)
     assert [one.range for one in found.strongest] == ["19 to 22", "1", "50"]
     assert math.degrees(found.strongest[0].amplitude) == pytest.approx(1e-3 * math.sqrt(25 + 36 + 30.25 + 20.25))
     assert lines_of([curve_block(found)]) == [
         "Joint 2: curve of 0.0078 +- 0.0004 deg rms, strongest at 19 to 22 periods a turn"
     ]
-    several = curve({1: 10.0, 28: 6.0, 58: 5.0, 40: 2.0}, np.linspace(-180, 180, 90))
-    assert lines_of([curve_block(several)])[0].endswith(
-        "0.0091 +- 0.0004 deg rms, strongest at 1, 28 and 58 periods a turn"
-    )
-    assert lines_of([curve_block(curve({1: 1.414214}, np.linspace(-180, 180, 90)))]) == [
-        "Joint 2: curve of 0.0010 +- 0.0004 deg rms, strongest at 1 period a turn"
-    ]
+    several = curve({1: 10.0, 28: 6.0, 58: 5.0, 40: 2.0}, EVERYWHERE)
+    (line,) = lines_of([curve_block(several)])
+    assert line.endswith("0.0091 +- 0.0004 deg rms, strongest at 1, 28 and 58 periods a turn")
+    (line,) = lines_of([curve_block(curve({1: 1.414214}, EVERYWHERE))])
+    assert line == "Joint 2: curve of 0.0010 +- 0.0004 deg rms, strongest at 1 period a turn"
     summary = held_by([curve_block(found)])
     assert list(summary) == ["joint", "rms_mdeg", "rms_deviation_mdeg", "strongest", "measured_deg"]
     assert summary["strongest"][1] == {"periods": [1, 1], "amplitude_mdeg": pytest.approx(3.0)}

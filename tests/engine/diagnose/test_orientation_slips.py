@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import Literal
+from itertools import product
 
 import numpy as np
 import pytest
@@ -70,6 +70,8 @@ def read_otherwise(way: str) -> Dataset:
         "rotation vector": rotation_from_vector(numbers),
         "angles for a vector": about(rotation_vector(R), "zyx"),
         "transposed": np.swapaxes(R, 1, 2),
+        "from the wrong end": rotation_from_quaternion(np.asarray(data.quaternion)[:, [3, 0, 1, 2]]),
+        "from the other end": rotation_from_quaternion(np.asarray(data.quaternion)[:, [1, 2, 3, 0]]),
     }[way]
     return replace(data, quaternion=quaternion_from_rotation(made))
 
@@ -84,6 +86,8 @@ def read_otherwise(way: str) -> Dataset:
         ("rotation vector", "orientation-order", "not a rotation vector but angles about zyx of moving axes"),
         ("angles for a vector", "orientation-order", "not angles about zyx of moving axes but a rotation vector"),
         ("transposed", "quaternion-order", "they turn the other way round, as transposed matrices do"),
+        ("from the wrong end", "quaternion-order", "w, x, y, z were taken for x, y, z, w"),
+        ("from the other end", "quaternion-order", "in the order x, y, z, w"),
     ],
 )
 def test_the_convention_that_was_meant_is_named(way: str, code: str, words: str) -> None:
@@ -92,27 +96,20 @@ def test_the_convention_that_was_meant_is_named(way: str, code: str, words: str)
     assert words in notice.message
 
 
-@pytest.mark.parametrize(
-    ("robot", "order", "axes"), [("ur10e", "xyz", "fixed"), ("gp7", "zyx", "fixed"), ("ur10e", "zyz", "moving")]
-)
-def test_a_rotation_vector_that_was_read_as_angles_is_named(
-    robot: str, order: str, axes: Literal["fixed", "moving"]
-) -> None:
-    data = with_orientations(robot, 8, 3)
-    vectors = rotation_vector(rotation_from_quaternion(np.asarray(data.quaternion)))
-    entry = AnglesEntry(columns=["A", "B", "C"], about=order, axes=axes, unit="rad")
-    (notice,) = orientation_slips(load_robot(robot), replace(data, quaternion=quaternions_of_angles(vectors, entry)))
-    assert notice.code == "orientation-order"
-    assert f"not angles about {order} of {axes} axes but a rotation vector" in notice.message
+def test_a_rotation_vector_that_was_read_as_angles_is_named() -> None:
+    for robot, order, axes in (("ur10e", "xyz", "fixed"), ("gp7", "zyx", "fixed"), ("ur10e", "zyz", "moving")):
+        data = with_orientations(robot, 8, 3)
+        vectors = rotation_vector(rotation_from_quaternion(np.asarray(data.quaternion)))
+        entry = AnglesEntry.model_validate({"columns": ["A", "B", "C"], "about": order, "axes": axes, "unit": "rad"})
+        read = replace(data, quaternion=quaternions_of_angles(vectors, entry))
+        (notice,) = orientation_slips(load_robot(robot), read)
+        assert notice.code == "orientation-order"
+        assert f"not angles about {order} of {axes} axes but a rotation vector" in notice.message
 
 
-def test_a_quaternion_read_from_the_wrong_end() -> None:
-    data = sound()
-    (notice,) = orientation_slips(
-        load_robot(ROBOT), replace(data, quaternion=np.asarray(data.quaternion)[:, [3, 0, 1, 2]])
-    )
-    assert notice.code == "quaternion-order"
-    assert "w, x, y, z were taken for x, y, z, w" in notice.message
+def test_a_check_says_it_too_and_nothing_of_sound_orientations() -> None:
+    for data, codes in ((sound(), []), (read_otherwise("from the other end"), ["quaternion-order"])):
+        assert [n.code for n in check(ROBOT, data).warnings if n.level == "error"] == codes
 
 
 def test_the_fit_says_the_cause() -> None:
@@ -122,21 +119,16 @@ def test_the_fit_says_the_cause() -> None:
     assert "The cause is most likely what orientation-order says" in told.message
 
 
-@pytest.mark.parametrize("robot", ["irb120", "ur10", "katana450"])
-def test_honest_orientations_are_left_alone(robot: str) -> None:
-    nominal = load_robot(robot)
-    for seed in range(20):
-        assert not orientation_slips(nominal, with_orientations(robot, 12, seed))
+def test_honest_orientations_are_left_alone() -> None:
+    for robot, seed in product(("irb120", "ur10", "katana450"), range(20)):
+        assert not orientation_slips(load_robot(robot), with_orientations(robot, 12, seed)), (robot, seed)
 
 
 def test_orientations_that_nothing_explains_are_given_no_name() -> None:
-    nominal, data = load_robot(ROBOT), sound()
     for seed in range(3):
-        drawn = np.random.default_rng(seed).normal(size=(len(data.target), 4))
-        few = replace(data, quaternion=drawn / np.linalg.norm(drawn, axis=1, keepdims=True)).of_configurations(
-            np.arange(6)
-        )
-        assert not orientation_slips(nominal, few)
+        drawn = np.random.default_rng(seed).normal(size=(len(sound().target), 4))
+        data = replace(sound(), quaternion=drawn / np.linalg.norm(drawn, axis=1, keepdims=True))
+        assert not orientation_slips(load_robot(ROBOT), data.of_configurations(np.arange(6))), seed
 
 
 # -- single rows ---------------------------------------------------------------------------------------------

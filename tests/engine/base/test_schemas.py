@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import pytest
 from pydantic import BaseModel
+from tests.expecting import refused
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.schemas import validated
@@ -27,74 +28,61 @@ UPRIGHT: Final = [1.0, 0.0, 0.0, 0.0]
 ABOVE: Final = [0.0, 0.0, 1.0]
 
 
-@pytest.mark.parametrize(
-    ("schema", "content", "said"),
-    [
-        (Bounds, BOUNDS | {"units": 3}, "units: named entries belong here; got 3; allowed: NAME: VALUE"),
-        (Bounds, BOUNDS | {"within": [1]}, "within: named entries belong here; got [1]; allowed: NAME: VALUE"),
-        (Bounds, BOUNDS | {"within": {"d_1": None}}, "within.d_1: a number belongs here; got nothing"),
-        (Bounds, BOUNDS | {"within": {"d_1": 10**400}}, "within.d_1: a number belongs here; got a number of very"),
-        (Bounds, BOUNDS | {"within": {"d_1": float("inf")}}, "within.d_1: the number is not finite; got inf"),
-        (
-            Bounds,
-            BOUNDS | {"within": {"d_1": -1.0}},
-            "within.d_1: the number is too small; got -1.0; allowed: 0 or more",
-        ),
-        (Bounds, BOUNDS | {"within": {5: 1.0}}, "within.5: a text belongs here, as the name of the entry; got 5"),
-        (Bounds, BOUNDS | {"between": {"d_1": [1]}}, "between.d_1: there are too few entries; got 1; allowed: 2."),
-        (Bounds, BOUNDS | {"between": {"d_1": []}}, "between.d_1: there are too few entries; got 0; allowed: 2."),
-        (
-            Bounds,
-            BOUNDS | {"between": {"d_1": [1, 2, 3]}},
-            "between.d_1: there are too many entries; got 3; allowed: 2.",
-        ),
-        (Bounds, BOUNDS | {"between": {"d_1": 3}}, "between.d_1: a list belongs here; got 3; allowed: entries in"),
-        (
-            Bounds,
-            BOUNDS | {"between": {"d_1": [1, [10**5000]]}},
-            "between.d_1[2]: a number belongs here; got a list of 1 entries",
-        ),
-        (Bounds, BOUNDS | {5: 1}, "5: the name of an entry must be a text; got 5; allowed: a name"),
-        (
-            Bounds,
-            BOUNDS | {"withn": {}},
-            "withn: this entry is not known here; allowed: truearm, units, within, between. D",
-        ),
-        (
-            Bounds,
-            BOUNDS | {"units": {"length": "mm", "angle": "deg", "time": "s"}},
-            "units.time: this entry is not known here; allowed: length, angle.",
-        ),
-        (Constraints, ALLOWED | {"limits": {"a": [1, 2]}}, "limits.a: a whole number belongs here, as the name of"),
-        (Constraints, ALLOWED | {"limits": {0: [1, 2]}}, "limits.0: the number is too small, as the name of the entry"),
-        (
-            Constraints,
-            ALLOWED | {"visibility": {"within": 1.0, "targets": {}}},
-            "visibility.targets: there are too few entries; got 0; allowed: at least 1",
-        ),
-        (
-            Constraints,
-            ALLOWED | {"visibility": {"within": 1.0, "targets": {"1": [0.0, 0.0, 0.0]}}},
-            "visibility: a direction cannot be zero; got '1: [0.0, 0.0, 0.0]'",
-        ),
-        (
-            Constraints,
-            ALLOWED | {"moments": {1: "up"}},
-            "moments.1: this value is not known; got 'up'; allowed: positive",
-        ),
-        (
-            CorrectionRecord,
-            {"truearm": "truearm-corrected/1", "original_sha256": "x"},
-            "program: this entry is missing",
-        ),
-    ],
+#: Of an entry: what it is beside good ones, and what is said.
+BAD_BOUNDS: Final[tuple[tuple[dict[object, object], str], ...]] = (
+    ({"units": 3}, "units: named entries belong here; got 3; allowed: NAME: VALUE"),
+    ({"units": UNITS | {"time": "s"}}, "units.time: this entry is not known here; allowed: length, angle."),
+    ({"within": [1]}, "within: named entries belong here; got [1]; allowed: NAME: VALUE"),
+    ({"within": {"d_1": None}}, "within.d_1: a number belongs here; got nothing"),
+    ({"within": {"d_1": 10**400}}, "within.d_1: a number belongs here; got a number of very"),
+    ({"within": {"d_1": float("inf")}}, "within.d_1: the number is not finite; got inf"),
+    ({"within": {"d_1": float("nan")}}, "within.d_1: this is not a number; got nan; allowed: a n"),
+    ({"within": {"d_1": -1.0}}, "within.d_1: the number is too small; got -1.0; allowed: 0 or more"),
+    ({"within": {"d_1": True}}, "within.d_1: a number belongs here; got true; allowed: a number"),
+    ({"within": {"d_1": [None, "x"]}}, "within.d_1: a number belongs here; got [null, x]; allowed"),
+    ({"within": {"d_1": {"b": 1}}}, "within.d_1: a number belongs here; got {b: 1}; allowed"),
+    ({"within": {5: 1.0}}, "within.5: a text belongs here, as the name of the entry; got 5"),
+    ({"within": {"\ud800": 1.0}}, "within: the text holds half a character; got '\\ud800'"),
+    ({"between": {"d_1": [1]}}, "between.d_1: there are too few entries; got 1; allowed: 2."),
+    ({"between": {"d_1": []}}, "between.d_1: there are too few entries; got 0; allowed: 2."),
+    ({"between": {"d_1": [1, 2, 3]}}, "between.d_1: there are too many entries; got 3; allowed: 2."),
+    ({"between": {"d_1": 3}}, "between.d_1: a list belongs here; got 3; allowed: entries in"),
+    ({"between": {"d_1": [1, [10**5000]]}}, "between.d_1[2]: a number belongs here; got a list of 1 entries"),
+    ({5: 1}, "5: the name of an entry must be a text; got 5; allowed: a name"),
+    ({"Within": {}}, "Within: this entry is not known here; allowed: truearm, units, within, between. Did you mean wi"),
+    ({"x": 1}, "x: this entry is not known here; allowed: truearm, units, within, between. Corr"),
 )
-def test_entries_that_do_not_fit_are_told_in_plain_words(
-    schema: type[BaseModel], content: dict[object, object], said: str
-) -> None:
-    with pytest.raises(InputError) as caught:
-        validated(content, schema, "f.yaml")
-    assert str(caught.value).startswith(f"f.yaml, {said}")
+BAD_CONSTRAINTS: Final[tuple[tuple[dict[object, object], str], ...]] = (
+    ({"limits": {"a": [1, 2]}}, "limits.a: a whole number belongs here, as the name of"),
+    ({"limits": {0: [1, 2]}}, "limits.0: the number is too small, as the name of the entry"),
+    ({"moments": {1: "up"}}, "moments.1: this value is not known; got 'up'; allowed: positive"),
+    (
+        {"visibility": {"within": 1.0, "targets": {}}},
+        "visibility.targets: there are too few entries; got 0; allowed: at least 1",
+    ),
+    (
+        {"visibility": {"within": 1.0, "targets": {"1": [0.0, 0.0, 0.0]}}},
+        "visibility: a direction cannot be zero; got '1: [0.0, 0.0, 0.0]'",
+    ),
+)
+BAD_FILES: Final = (
+    (Bounds, None, "f.yaml: the file holds no entries, only comments or nothing; allowed: NAME: VALUE"),
+    (Bounds, [1, 2], "f.yaml: the file must hold named entries; got [1, 2]; allowed: NAME: VALUE"),
+    (Bounds, {**BOUNDS, "units": {"Length": "mm", "angle": "deg"}}, "It may be the entry Length, which is not"),
+    (Bounds, {"truearm": "truearm-bounds/1"}, "units: this entry is missing; allowed: named entries (length, "),
+    (
+        CorrectionRecord,
+        {"truearm": "truearm-corrected/1", "original_sha256": "x"},
+        "f.yaml, program: this entry is missing",
+    ),
+    *((Bounds, BOUNDS | content, f"f.yaml, {said}") for content, said in BAD_BOUNDS),
+    *((Constraints, ALLOWED | content, f"f.yaml, {said}") for content, said in BAD_CONSTRAINTS),
+)
+
+
+def test_entries_that_do_not_fit_are_told_in_plain_words() -> None:
+    for schema, content, said in BAD_FILES:
+        assert said in refused(None, "", validated, content, schema, "f.yaml"), said
 
 
 #: A whole file of each kind, with every entry that there is.
@@ -147,14 +135,8 @@ FILES: Final[dict[type[BaseModel], dict[object, object]]] = {
     },
     MappingFile: {
         "truearm": "truearm-mapping/1",
-        "layout": {
-            "delimiter": "comma",
-            "decimal": "point",
-            "header": 1,
-            "first_row": 2,
-            "comment": "#",
-            "encoding": "utf-8",
-        },
+        "layout": {"delimiter": "comma", "decimal": "point", "header": 1, "first_row": 2}
+        | {"comment": "#", "encoding": "utf-8"},
         "configuration": {"column": "pose"},
         "names": {"column": "ball", "pattern": "(?P<target>.*)", "others": "skip"},
         "length_unit": "mm",
@@ -240,25 +222,3 @@ def test_every_damaged_entry_is_told_in_the_form_of_the_house(schema: type[BaseM
             assert "; got " in message or "; allowed: " in message or SAYS_IT.search(message), message
             assert len(message) < 900, message
     assert refused > 100
-
-
-@pytest.mark.parametrize(
-    ("schema", "content", "said"),
-    [
-        (Bounds, None, "f.yaml: the file holds no entries, only comments or nothing; allowed: NAME: VALUE"),
-        (Bounds, [1, 2], "f.yaml: the file must hold named entries; got [1, 2]; allowed: NAME: VALUE"),
-        (Bounds, {**BOUNDS, "units": {"Length": "mm", "angle": "deg"}}, "It may be the entry Length, which is not"),
-        (Bounds, {"truearm": "truearm-bounds/1"}, "units: this entry is missing; allowed: named entries (length, "),
-        (Bounds, {**BOUNDS, "Within": {}}, "allowed: truearm, units, within, between. Did you mean within?"),
-        (Bounds, {**BOUNDS, "x": 1}, "x: this entry is not known here; allowed: truearm, units, within, between. Corr"),
-        (Bounds, {**BOUNDS, "within": {"a": True}}, "within.a: a number belongs here; got true; allowed: a number"),
-        (Bounds, {**BOUNDS, "within": {"a": [None, "x"]}}, "within.a: a number belongs here; got [null, x]; allowed"),
-        (Bounds, {**BOUNDS, "within": {"a": {"b": 1}}}, "within.a: a number belongs here; got {b: 1}; allowed"),
-        (Bounds, {**BOUNDS, "within": {"a": float("nan")}}, "within.a: this is not a number; got nan; allowed: a n"),
-        (Bounds, {**BOUNDS, "within": {"\ud800": 1.0}}, "within: the text holds half a character; got '\\ud800'"),
-    ],
-)
-def test_what_is_said_of_a_file(schema: type[BaseModel], content: object, said: str) -> None:
-    with pytest.raises(InputError) as caught:
-        validated(content, schema, "f.yaml")
-    assert said in str(caught.value)

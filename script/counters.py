@@ -241,7 +241,7 @@ def main() -> int:
         MARKS.write_text(json.dumps(counters, indent=4) + "\n")
         return 0
     if worse:
-        print(f"\nGrown: {', '.join(worse)}. Mend it, or say so in this commit: python script/counters.py --write")
+        print(f"\nGrown: {', '.join(worse)}. Fix it, or say so in this commit: python script/counters.py --write")
     return bool(worse)
 
 

@@ -14,7 +14,7 @@ from papers import Progress
 from papers.campaign import Campaign, two_steps
 from papers.lrmate_hexapod import judgement
 from papers.lrmate_hexapod.identification import Cups, identified_following, identified_holding, rebased
-from papers.lrmate_hexapod.judgement import HeldOut, Judgement, held_out, mean_position_error
+from papers.lrmate_hexapod.judgement import Diagnosis, HeldOut, held_out, mean_position_error
 from papers.lrmate_hexapod.robot import BACK_DOWN, FIXTURE, FRONT_UP, drawn_twin, invented_twin, nominal_robot, touches
 from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
@@ -80,7 +80,7 @@ class _Drawn:
 
     campaign: Campaign  #: With the device.
     front: tuple[bool, ...]  #: Which of the measured rows are front/up.
-    judgements: Mapping[str, Judgement]  #: Of every model.
+    judgements: Mapping[str, Diagnosis]  #: Of every model.
     away: Array  #: Distance of each held-out configuration from the reference point [m], ``(n,)``.
     front_up: NDArray[np.bool_]  #: Which of them are front/up, ``(n,)``.
 

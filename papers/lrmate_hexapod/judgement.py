@@ -73,7 +73,7 @@ def held_out(robot: Robot, twin: Twin, joints: Array) -> HeldOut:
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class Diagnosis:
     """Errors of a model at unseen configurations."""
 
     position: Array  #: [m], ``(n,)``.
@@ -88,13 +88,13 @@ class Judgement:
         return float(self.position.mean())
 
 
-def judged(model: Robot, truth: HeldOut) -> Judgement:
+def judged(model: Robot, truth: HeldOut) -> Diagnosis:
     """Compare a model with what a twin does, both in the same frame."""
     at = model.loaded(truth.joints)
     predicted = _predicted(model, at, truth)
     turned = model.world_poses(at)[1] @ np.swapaxes(truth.rotation, 1, 2)
     front = truth.front_up
-    return Judgement(
+    return Diagnosis(
         position=np.linalg.norm(predicted - truth.position, axis=1),
         orientation=np.linalg.norm(rotation_vector(turned), axis=1),
         pairs=pair_distances(predicted, truth.position),

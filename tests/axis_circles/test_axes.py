@@ -235,8 +235,8 @@ def test_undeclared_noise_is_found_from_what_the_circles_leave() -> None:
 def test_poses_that_belong_to_no_run_are_counted() -> None:
     rng = np.random.default_rng(3)
     twin = truth_twin(load_robot("irb120"), "nominal", rng)
-    wild = load_robot("irb120").random_configurations(4, rng)
-    found = analyse(load_robot("irb120"), measure(twin, np.concatenate([runs(), wild]), 1e-5, rng))
+    outlying = load_robot("irb120").random_configurations(4, rng)
+    found = analyse(load_robot("irb120"), measure(twin, np.concatenate([runs(), outlying]), 1e-5, rng))
     assert found.found.left_out == 4
     assert "left-out" in {n.code for n in found.notices}
 
@@ -244,12 +244,14 @@ def test_poses_that_belong_to_no_run_are_counted() -> None:
 def test_what_cannot_be_used_is_refused() -> None:
     rng = np.random.default_rng(0)
     twin = truth_twin(load_robot("irb120"), "nominal", rng)
-    few, wild = (measure(twin, q, 0.0, rng) for q in (runs()[:168], load_robot("irb120").random_configurations(9, rng)))
+    few, outlying = (
+        measure(twin, q, 0.0, rng) for q in (runs()[:168], load_robot("irb120").random_configurations(9, rng))
+    )
     data = measure(twin, runs(), 1e-5, rng)
     refused(None, "other joints than katana450.*allowed: 5", analyse, load_robot("katana450"), data)
     for wrong, told in (
         (few, "no run of joint 5, 6"),
-        (wild, "one joint moves alone"),
+        (outlying, "one joint moves alone"),
         (replace(data, joints=data.joints * [1, 1, 1, -1, 1, 1]), "joint 4 does not turn as the robot file says"),
         (
             measure(twin, np.concatenate([runs()[:210], runs()[210:214] * 0.01]), 2e-5, rng),
@@ -280,8 +282,10 @@ def test_runs_are_where_one_joint_alone_moves() -> None:
     both = np.concatenate([angles, angles[::-1]])
     rng = np.random.default_rng(1)
     flicker = np.radians(rng.uniform(-0.002, 0.002, (len(angles), 6)))
-    wild = load_robot("irb120").random_configurations(5, rng)
-    joints = np.concatenate([sweep(1, both, home), wild, sweep(5, angles, ahead) + flicker, sweep(5, angles[:3], home)])
+    outlying = load_robot("irb120").random_configurations(5, rng)
+    joints = np.concatenate(
+        [sweep(1, both, home), outlying, sweep(5, angles, ahead) + flicker, sweep(5, angles[:3], home)]
+    )
     runs = find_runs(read_at(joints))
     assert [run.joint for run in runs] == [1, 5]
     assert runs[0].configurations.tolist() == list(range(18))

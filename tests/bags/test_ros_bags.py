@@ -112,10 +112,10 @@ def test_several_targets_and_a_point_beside_the_robot(tmp_path: Path) -> None:
     assert refused(bag, "and no target", references={"tool": "/ground"})
 
 
-def test_wild_samples_are_set_aside_and_told(tmp_path: Path) -> None:
-    wild = POSITIONS.copy()
-    wild[20] += [0.0, 0.4, 0.0]
-    lost = wild.copy()
+def test_outlying_samples_are_set_aside_and_told(tmp_path: Path) -> None:
+    outlying = POSITIONS.copy()
+    outlying[20] += [0.0, 0.4, 0.0]
+    lost = outlying.copy()
     lost[10] = np.nan
     bag = write_ros2(tmp_path / "cell", [*OF_JOINTS, *target_messages(SEEN, lost, TURNS)])
     read = truearm.import_ros(bag)
@@ -130,7 +130,7 @@ def test_wild_samples_are_set_aside_and_told(tmp_path: Path) -> None:
     assert "2 samples set aside" in str(truearm.import_ros(bag).lines())
     positions[[5, 7, 9]] += [0.0, 0.3, 0.0]
     bag = write_ros2(tmp_path / "five", [*joint_messages(times, joints), *target_messages(seen, positions, turns)])
-    assert refused(bag, "too many samples of a standstill are wild")
+    assert refused(bag, "too many samples of a standstill are outlying")
 
 
 def test_pauses_that_are_no_standstills_are_said(tmp_path: Path) -> None:

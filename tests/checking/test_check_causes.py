@@ -155,7 +155,7 @@ def test_rows_in_another_unit_of_length_are_all_named_and_nothing_else_is_said_o
         (notice,) = run.warnings
         assert (notice.code, notice.level, said in notice.message) == ("unit-length", "error", True), notice.message
         assert {"/".join(where) for where in notice.at} == rows, said
-        assert [step.code for step in run.next] == ["mend-data"], said
+        assert [step.code for step in run.next] == ["fix-data"], said
 
 
 def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
@@ -271,7 +271,7 @@ def test_blocks_of_rows_and_all_rows_in_another_unit_of_angle_are_told(
         assert told.code == "unit-angle", share
         assert f"{words}, at some configurations alone (1, 2" in told.message, share
     every = check(ROBOT, replace(data, joints=units(data.joints))).warnings
-    assert any(n.message == f"The joints: {words}. Mend the unit in the header." for n in every)
+    assert any(n.message == f"The joints: {words}. Fix the unit in the header." for n in every)
 
 
 def test_a_reading_far_off_is_blamed_once_and_no_good_one_with_it() -> None:

@@ -13,8 +13,8 @@ from truearm.calibration.calibrate import calibrate
 from truearm.checking.check import check
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.advice import check_fit
+from truearm.engine.diagnose.entry_errors import quick_misfit
 from truearm.engine.diagnose.expected_error import expected_error
-from truearm.engine.diagnose.slips import quick_misfit
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import MODELS
 from truearm.engine.robot.library import load_robot

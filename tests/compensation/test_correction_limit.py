@@ -86,7 +86,7 @@ def test_what_is_accepted_is_a_length_and_an_angle(tmp_path: Path) -> None:
         assert refusal.value.parameter == "accept_correction", text
 
 
-def test_a_frame_with_a_slip_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+def test_a_frame_with_a_entry_error_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     """A digit of a frame was wrong, and 100 mm were promised to become 0.06 mm."""
     program, out = plate(tmp_path), tmp_path / "out"
     given = {"frames": placed(tmp_path, "of: base, translation: [410, -110, 60]"), "out": out, **ANSWERED}

@@ -144,8 +144,8 @@ def test_a_robot_is_computed_anew_where_its_own_entry_or_file_changes(folder: Pa
         asked = read_manifest(path)
         return [asked.key(part) for part in range(asked.parts)]
 
-    first, mended = keys(rows), keys(rows.replace("b.csv,,,,", "b.csv,,,,9"))
-    assert [a == b for a, b in zip(first, mended, strict=True)] == [True, False]
+    first, corrected = keys(rows), keys(rows.replace("b.csv,,,,", "b.csv,,,,9"))
+    assert [a == b for a, b in zip(first, corrected, strict=True)] == [True, False]
     (folder / "arm.yaml").write_text("another arm\n", "utf-8")
     assert [a == b for a, b in zip(first, keys(rows), strict=True)] == [True, False]
     assert keys(rows + "three,ur5,bounds.yaml,,,,,\n")[:2] == keys(rows)

@@ -1,4 +1,4 @@
-"""A fleet of robots that were measured: from manifest to folder, what is tried before and mended after."""
+"""A fleet of robots that were measured: from manifest to folder, what is tried before and corrected after."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def test_a_folder_that_cannot_be_written_is_no_fault_of_the_robot(campaigns: Pat
     said_of(None, "a folder is needed", calibrated_robot, entry, tmp_path)
 
 
-# -- what is tried before anything is computed, and mended afterwards ----------------------------------------------
+# -- what is tried before anything is computed, and corrected afterwards ----------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -272,12 +272,12 @@ def test_a_fleet_of_which_all_robots_failed_ends_with_an_error(
     assert "Error (no-result): None of 1 robot has a result" in capsys.readouterr().out
 
 
-def test_a_mended_manifest_goes_on_with_what_it_has_not_changed(measured: Path, tmp_path: Path) -> None:
+def test_a_corrected_manifest_goes_on_with_what_it_has_not_changed(measured: Path, tmp_path: Path) -> None:
     folder = own(measured, tmp_path)
     first = (folder / "out" / "parts" / "0000" / "0000001.jsonl").read_bytes()
     three = {"name": "three", "robot": "irb120", "data": "3.csv"}
-    mended = [ROBOTS[0], {**ROBOTS[1], "options": {"train": 14}}, three]
-    path = manifest(folder, mended)
+    corrected = [ROBOTS[0], {**ROBOTS[1], "options": {"train": 14}}, three]
+    path = manifest(folder, corrected)
     found = run(path)
     assert (found.run.parts, found.run.before) == (3, 1)
     assert found.run.told == ("1 part computed again, because the manifest or files of it have changed: two",)
@@ -286,7 +286,9 @@ def test_a_mended_manifest_goes_on_with_what_it_has_not_changed(measured: Path, 
     assert run(path).run.before == 3
 
 
-def test_mended_data_are_computed_again_and_another_fleet_does_not_go_on_there(measured: Path, tmp_path: Path) -> None:
+def test_corrected_data_are_computed_again_and_another_fleet_does_not_go_on_there(
+    measured: Path, tmp_path: Path
+) -> None:
     folder = own(measured, tmp_path)
     for robots, chunk in ((ROBOTS[::-1], 1), (ROBOTS, 2), (ROBOTS[:1], 1)):
         told = refused(manifest(folder, robots, chunk=chunk))

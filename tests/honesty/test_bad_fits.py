@@ -62,7 +62,7 @@ def swapped(data: Dataset, share: float, *, late: bool = False) -> Dataset:
     return replace(data, target=target.astype(np.intp))
 
 
-def with_slips(data: Dataset, count: int) -> Dataset:
+def with_entry_errors(data: Dataset, count: int) -> Dataset:
     """Return data of which a few readings are 60 mm off."""
     rng = np.random.default_rng(1)
     position, off = data.position.copy(), rng.standard_normal((count, 3))
@@ -105,7 +105,7 @@ def test_a_robust_loss_is_not_pulled_by_exchanged_names(tmp_path: Path) -> None:
 
 
 def test_a_fit_that_is_worse_than_the_nominal_robot_is_an_error(tmp_path: Path) -> None:
-    file = written(tmp_path, with_slips(small_arm("nominal"), 5))
+    file = written(tmp_path, with_entry_errors(small_arm("nominal"), 5))
     found = told("calibrate", "irb120", file, "--out", tmp_path / "out")
     assert found.code == 3
     assert found.says("worse-than-nominal", "error", r"1 %\)"), found
@@ -117,10 +117,10 @@ def test_a_fit_that_is_worse_than_the_nominal_robot_is_an_error(tmp_path: Path) 
     assert not (tmp_path / "corrected").exists()
 
 
-def test_the_same_readings_without_slips_or_with_a_robust_loss_are_not(tmp_path: Path) -> None:
+def test_the_same_readings_without_entry_errors_or_with_a_robust_loss_are_not(tmp_path: Path) -> None:
     honest = written(tmp_path, small_arm("nominal"), "honest.csv")
-    slips = written(tmp_path, with_slips(small_arm("nominal"), 5), "slips.csv")
-    for words in ([honest], [slips, "--loss", "cauchy"]):
+    entry_errors = written(tmp_path, with_entry_errors(small_arm("nominal"), 5), "slips.csv")
+    for words in ([honest], [entry_errors, "--loss", "cauchy"]):
         found = told("calibrate", "irb120", *words, "--out", tmp_path / "out")
         assert (found.code, found.levels["no-gain"]) == (0, "warning")
         assert "worse-than-nominal" not in found.levels
@@ -193,14 +193,14 @@ def test_python_hands_out_the_result_that_was_not_written(sound: Path, tmp_path:
 
 def test_it_does_where_that_is_asked_for_and_then_anything_replaces_it(truearm: Truearm, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    sound, six, slips = (
+    sound, six, entry_errors = (
         written(tmp_path, data, f"{n}.csv") for n, data in enumerate((small_arm(), bad("six"), bad("accurate")))
     )
     assert truearm("calibrate", "irb120", sound, "--out", out).code == 0
     assert truearm("calibrate", "irb120", six, "--out", out, "--replace").code == 3
     content = json.loads((out / "result.json").read_text())
     assert (content["status"], "--replace" in content["command"]) == ("rank-loss", False)
-    assert truearm("calibrate", "irb120", slips, "--out", out).code == 0  # a bad one replaces a bad one
+    assert truearm("calibrate", "irb120", entry_errors, "--out", out).code == 0  # a bad one replaces a bad one
     assert truearm("calibrate", "irb120", six, "--out", out).code == 3
     assert truearm("calibrate", "irb120", sound, "--out", out).code == 0  # and a sound one any
     assert truearm("calibrate", "irb120", sound, "--out", out, "--model", "elastic").code == 0

@@ -174,15 +174,15 @@ def one_after_the_other(*changes: Change) -> Change:
 
 
 def missing_by(deviation: float, *, each_target: bool = False) -> Change:
-    """Read the robot with joints that miss by so much [deg] at every arrival, each target on one of its own or not."""
+    """Read the robot with joints that miss by so much [deg] at every visit, each target on one of its own or not."""
 
     def change(data: Dataset) -> Dataset:
         rng = np.random.default_rng(2)
         position = data.position.copy()
-        for arrival in range(len(data.targets) if each_target else 1):
+        for visit in range(len(data.targets) if each_target else 1):
             missed = np.radians(deviation) * rng.standard_normal(data.joints.shape)
             read = measure(honest()[0], data.joints + missed, NOISE, rng).position
-            mine = data.target == arrival if each_target else np.ones(len(data.target), dtype=bool)
+            mine = data.target == visit if each_target else np.ones(len(data.target), dtype=bool)
             position[mine] = read[mine]
         return replace(data, position=position)
 
@@ -331,7 +331,7 @@ LIES: Final[dict[str, Lie]] = {
     "instrument-moved-and-rows-shuffled": Lie(
         one_after_the_other(moved_by_a_millimetre, without_sigma, shuffled),
         "calibrate",
-        "large-remainder",
+        "large-residual",
         "warning",
         "instrument or a base that moved",
         0,
@@ -340,7 +340,7 @@ LIES: Final[dict[str, Lie]] = {
     "another-robot-and-no-sigma": Lie(
         one_after_the_other(two_robots, without_sigma, shuffled),
         "calibrate",
-        "large-remainder",
+        "large-residual",
         "warning",
         "another robot",
         0,

@@ -167,7 +167,7 @@ def test_touched_cups_are_read_from_the_pendant(tmp_path: Path) -> None:
     refused(None, r"touches\.csv, column axis_1: it is not known how", read_touches, file, unknown)
 
 
-def test_other_slips_are_looked_for_in_what_was_noted(data: Dataset) -> None:
+def test_other_entry_errors_are_looked_for_in_what_was_noted(data: Dataset) -> None:
     robot = load_robot(FANUC)
     robot = replace(robot, controller=replace(robot.controller, zeros=(0.0, 0.0, 1.5, 0.0, 0.0, 0.0)))
     noted = in_controller_joints(robot, data)

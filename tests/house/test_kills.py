@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from tests.kill_every_job import EARLIER, PLACES, tried
 
-#: Faults that are known: the test says when they are mended.
+#: Faults that are known: the test says when they are corrected.
 KNOWN = {"example": pytest.mark.xfail(reason="killed, it leaves files of names that are drawn, and refuses to go on")}
 
 

@@ -193,12 +193,12 @@ def test_forces_of_the_wrong_sign_are_an_error() -> None:
     assert not result.finished
 
 
-def test_an_instrument_that_slips_is_told() -> None:
-    def slips(angle: Array) -> Array:
+def test_an_instrument_that_entry_errors_is_told() -> None:
+    def entry_errors(angle: Array) -> Array:
         angle[1::2, 2] += math.radians(0.002)
         return angle
 
-    result = truearm.tilting(KATANA, with_angles(slips))
+    result = truearm.tilting(KATANA, with_angles(entry_errors))
     assert codes(result)["inclinations-scatter"] == "warning"
     assert "link 3" in next(n.message for n in result.notices if n.code == "inclinations-scatter")
 

@@ -193,8 +193,8 @@ def test_texts_name_parameters_of_these_jobs_alone() -> None:
                 assert named <= known, (file.name, node.value)
 
 
-def test_a_wild_row_is_said_with_the_value_without_it(small: Arguments) -> None:
-    assert not {"wild-row", "two-places", "places-missing"} & {*notices(evaluated(small, "poses"))}
+def test_a_outlying_row_is_said_with_the_value_without_it(small: Arguments) -> None:
+    assert not {"outlying-row", "two-places", "places-missing"} & {*notices(evaluated(small, "poses"))}
     lines: list[Row] = []
 
     def off_on_line_9(row: Row) -> None:
@@ -203,7 +203,7 @@ def test_a_wild_row_is_said_with_the_value_without_it(small: Arguments) -> None:
             row["y [mm]"] = str(float(row["y [mm]"]) + 5.0)
 
     each_row(small["poses"], off_on_line_9)
-    said = notices(evaluated(small, "poses"))["wild-row"]
+    said = notices(evaluated(small, "poses"))["outlying-row"]
     assert said.level == "warning"
     assert re.search(
         rf"^Cycle 2 of AP {lines[7]['pose']}, 100 %, load 100 %, on line 9 lies 5(\.\d+)? mm from the others, which "
@@ -224,7 +224,7 @@ def test_two_places_of_rest_are_said_with_the_rows_of_the_fewer(tmp_path: Path) 
             lines.append(str(len(rows) + 1))
 
     each_row(given["poses"], elsewhere)
-    (said,) = [one for one in evaluated(given, "poses").warnings if one.code in ("two-places", "wild-row")]
+    (said,) = [one for one in evaluated(given, "poses").warnings if one.code in ("two-places", "outlying-row")]
     assert (said.code, said.level) == ("two-places", "warning")
     assert "AP P4, 100 %, load 100 % (6 and 18 cycles, 0.3" in said.message
     assert f"the 6 on lines {', '.join(lines)})" in said.message

@@ -15,7 +15,7 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.transform import Transform, rotation_from_vector
 from truearm.iso9283.criteria.alignment import Alignment
-from truearm.iso9283.criteria.compliance import GRAVITY, evaluate_pushes, wild_pushes
+from truearm.iso9283.criteria.compliance import GRAVITY, evaluate_pushes, outlying_pushes
 from truearm.iso9283.criteria.drift import groups_of
 from truearm.iso9283.criteria.intervals import norm_interval, repeatability
 from truearm.iso9283.criteria.poses import PoseCloud, evaluate
@@ -282,17 +282,17 @@ def test_compliance_of_a_linear_spring() -> None:
     assert lines[0].displacement == pytest.approx(lines[0].force * 2e-6, abs=1e-12)
 
 
-def test_a_wild_push_is_named_and_no_other() -> None:
+def test_a_outlying_push_is_named_and_no_other() -> None:
     task = plan(PlannedTest("compliance", ("P1",), 3))
     rng = np.random.default_rng(2)
     read = pushes()
     for _ in range(50):
         noisy = dataclasses.replace(read, position=read.position + 3e-6 * rng.standard_normal(read.position.shape))
-        assert wild_pushes(evaluate_pushes(task, noisy, TIE, TRACKER)[1], TRACKER) == ()
+        assert outlying_pushes(evaluate_pushes(task, noisy, TIE, TRACKER)[1], TRACKER) == ()
     position = noisy.position.copy()
     position[[40, 100]] += [[2e-4, 0, 0], [0, -1e-4, 0]]
     values, lines = evaluate_pushes(task, dataclasses.replace(noisy, position=position), TIE, TRACKER)
-    one, other = wild_pushes(lines, TRACKER)
+    one, other = outlying_pushes(lines, TRACKER)
     assert (one.line, one.direction, other.line, other.direction) == (42, "-x", 102, "-y")
     assert (one.away, other.away) == pytest.approx((2e-4, 1e-4), rel=0.2)
     for named in (one, other):
@@ -361,11 +361,11 @@ def test_a_tie_that_is_as_far_off_as_the_robot_leaves_drift_open() -> None:
 
 
 def test_poses_of_another_cube_are_told() -> None:
-    def clouds(scale: float, shift: float, wild: float = 0.0) -> tuple[PoseCloud, ...]:
+    def clouds(scale: float, shift: float, outlying: float = 0.0) -> tuple[PoseCloud, ...]:
         middle = POINTS.mean(axis=0)
         made = []
         for k, point in enumerate(POINTS):
-            at = middle + scale * (point - middle) + np.array([shift, 0.0, wild * (-1) ** k])
+            at = middle + scale * (point - middle) + np.array([shift, 0.0, outlying * (-1) ** k])
             made.append(PoseCloud("AP", "", NAMES[k], "", 1.0, 1.0, point, at[None], at, 0.0))
         return tuple(made)
 
@@ -380,5 +380,5 @@ def test_poses_of_another_cube_are_told() -> None:
     pair = other_cube(clouds(0.98, 0.001)[1:4:2], side)
     assert pair is not None
     assert pair.scale == pytest.approx(0.98)
-    for ordinary in (clouds(1.009, 0.0), clouds(1.0, 0.009), clouds(1.02, 0.0, wild=2e-3), clouds(1.02, 0.0)[:1]):
+    for ordinary in (clouds(1.009, 0.0), clouds(1.0, 0.009), clouds(1.02, 0.0, outlying=2e-3), clouds(1.02, 0.0)[:1]):
         assert other_cube(ordinary, side) is None

@@ -1,4 +1,4 @@
-"""Readings and times with few decimals: no wild rows, no unusual samples, and figures that stand or are marked."""
+"""Readings and times with few decimals: no outlying rows, no unusual samples, and figures that stand or are marked."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.corners import corner_values
 from truearm.iso9283.criteria.rows import Instrument
-from truearm.iso9283.criteria.runs import refuse_wild, wild_steps
+from truearm.iso9283.criteria.runs import outlying_steps, refuse_outlying
 from truearm.iso9283.criteria.settling import settling_values
 from truearm.iso9283.criteria.streams import clock_of
 from truearm.iso9283.criteria.velocity import velocity_values
@@ -98,11 +98,11 @@ def test_times_too_coarse_to_say_how_fast_the_tip_is_are_refused_as_such() -> No
     x[100] += 0.5
     samples = samples_of("t", "P1", [(1, np.round(t, 2), x)])
     clock = clock_of(samples.time)
-    steps = wild_steps(clock.time, x, None)
+    steps = outlying_steps(clock.time, x, None)
     assert clock.is_coarse
     assert len(steps.before)
     with pytest.raises(InputError, match=r"rounded too coarsely.*more decimals"):
-        refuse_wild(samples, np.arange(len(t)), x, steps, 1, clock)
+        refuse_outlying(samples, np.arange(len(t)), x, steps, 1, clock)
 
 
 def test_times_that_are_the_same_by_rounding_are_not_called_written_twice(tmp_path: Path) -> None:

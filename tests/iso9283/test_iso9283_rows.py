@@ -23,8 +23,8 @@ from truearm.engine.robot.transform import (
     rotation_from_vector,
 )
 from truearm.iso9283.criteria.alignment import Alignment
+from truearm.iso9283.criteria.outlying_rows import UnusualRows, alike_cycles, unusual_rows
 from truearm.iso9283.criteria.rows import Cycles, Instrument, cycles_of, refuse_copied_poses, refuse_far_orientations
-from truearm.iso9283.criteria.wild_rows import UnusualRows, alike_cycles, unusual_rows
 from truearm.iso9283.evaluating.evaluation import Evaluation, Measurements, evaluated
 from truearm.iso9283.evaluating.table import row_notices
 from truearm.iso9283.planning.criteria import PerformancePlan
@@ -134,7 +134,7 @@ def test_clean_campaigns_are_silent() -> None:
         made = unusual(
             plan, moved(read, np.arange(len(read.cycle)), SCATTER * rng.standard_normal(read.position.shape))
         )
-        assert (made.wild, made.two_places) == ((), ())
+        assert (made.outlying, made.two_places) == ((), ())
     assert found(plan, read).missing == ()
 
 
@@ -142,7 +142,7 @@ def test_clean_campaigns_are_silent() -> None:
     ("test", "criteria"),
     [("AP", ("AP", "RP")), ("vAP", ("vAP",)), ("AD", ("AD", "RD")), ("dAP", ("dAP", "dRP")), ("E", ("E",))],
 )
-def test_a_wild_row_is_named_with_what_it_changes(test: str, criteria: tuple[str, ...]) -> None:
+def test_a_outlying_row_is_named_with_what_it_changes(test: str, criteria: tuple[str, ...]) -> None:
     plan, read = campaign(1, (test,))
     where: dict[str, dict[str, Any]] = {
         "AP": {"pose": "P3", "velocity": 0.5},
@@ -152,56 +152,61 @@ def test_a_wild_row_is_named_with_what_it_changes(test: str, criteria: tuple[str
     of: dict[str, Any] = {"criterion": test, "cycle": 4} | where.get(test, {})
     row = int(rows_of(read, **of)[0])
     spoilt = moved(read, np.array([row]), [0, 5e-3, 0])
-    (wild,) = found(plan, spoilt).unusual.wild
-    assert (wild.of.test, wild.kind, int(wild.of.cycle[0]), int(wild.of.line[0])) == (test, "position", 4, row + 2)
-    assert wild.away == pytest.approx(5e-3, rel=0.1)
-    assert {value.id for value, _ in wild.changes} == {*criteria}
-    assert np.isfinite([other.value for _, other in wild.changes]).all()
+    (outlying,) = found(plan, spoilt).unusual.outlying
+    assert (outlying.of.test, outlying.kind, int(outlying.of.cycle[0]), int(outlying.of.line[0])) == (
+        test,
+        "position",
+        4,
+        row + 2,
+    )
+    assert outlying.away == pytest.approx(5e-3, rel=0.1)
+    assert {value.id for value, _ in outlying.changes} == {*criteria}
+    assert np.isfinite([other.value for _, other in outlying.changes]).all()
     if test == "AP":
         clean = {(v.id, v.where, v.conditions): v.value for v in found(plan, read).values if v.component == "position"}
-        for value, without in wild.changes:
+        for value, without in outlying.changes:
             assert without.value == pytest.approx(clean[value.id, value.where, value.conditions], rel=0.2)
             assert without.cycles == value.cycles - 1
-        rp, rp_without = wild.changes[0]
+        rp, rp_without = outlying.changes[0]
         assert rp.id == "RP"
         assert rp.value > 2.5e-3
         assert rp_without.value < 2e-4
 
 
-def test_a_wild_orientation_is_named() -> None:
+def test_a_outlying_orientation_is_named() -> None:
     plan, read = campaign(1, ("AP",))
     row = int(rows_of(read, criterion="AP", pose="P2", cycle=9)[0])
     assert read.rotation is not None
     rotation = read.rotation.copy()
     rotation[row] = rotation_from_vector(np.array([0, 0.02, 0])) @ rotation[row]
-    (wild,) = found(plan, dataclasses.replace(read, rotation=rotation)).unusual.wild
-    assert (wild.kind, int(wild.of.line[0])) == ("orientation", row + 2)
-    assert wild.away == pytest.approx(0.02, rel=0.1)
-    assert wild.changes[0][0].component == "b"
+    (outlying,) = found(plan, dataclasses.replace(read, rotation=rotation)).unusual.outlying
+    assert (outlying.kind, int(outlying.of.line[0])) == ("orientation", row + 2)
+    assert outlying.away == pytest.approx(0.02, rel=0.1)
+    assert outlying.changes[0][0].component == "b"
 
 
-def test_several_wild_rows_are_named_and_ten_times_the_scatter_is_enough() -> None:
+def test_several_outlying_rows_are_named_and_ten_times_the_scatter_is_enough() -> None:
     plan, read = campaign(2, ("AP",))
     rows = np.array([rows_of(read, pose=f"P{k}", cycle=7)[0] for k in (1, 3, 5)])
     away = 10 * math.sqrt(3) * SCATTER * np.array([[1, 0, 0], [0, -1, 0], [0, 0.6, 0.8]])
-    assert {int(one.of.line[0]) for one in unusual(plan, moved(read, rows, away)).wild} == {*(rows + 2)}
+    assert {int(one.of.line[0]) for one in unusual(plan, moved(read, rows, away)).outlying} == {*(rows + 2)}
 
 
-def test_three_cycles_of_a_pose_have_a_wild_row_where_others_show_the_scatter() -> None:
+def test_three_cycles_of_a_pose_have_a_outlying_row_where_others_show_the_scatter() -> None:
     plan, read = campaign(2, ("AP",))
     few = in_order(read, np.flatnonzero(read.cycle <= 3))
-    assert unusual(plan, few).wild == ()
+    assert unusual(plan, few).outlying == ()
     row = int(rows_of(few, pose="P4", cycle=2)[0])
-    (wild,) = unusual(plan, moved(few, np.array([row]), [0, 5e-3, 0])).wild
-    assert int(wild.of.line[0]) == int(few.line[row])
+    (outlying,) = unusual(plan, moved(few, np.array([row]), [0, 5e-3, 0])).outlying
+    assert int(outlying.of.line[0]) == int(few.line[row])
 
 
-def test_two_places_of_rest_are_told_and_their_rows_are_not_wild() -> None:
+def test_two_places_of_rest_are_told_and_their_rows_are_not_outlying() -> None:
     plan, read = campaign(4, ("AP",))
     rows = np.concatenate([rows_of(read, pose="P2", velocity=1.0, cycle=c) for c in (3, 4, 9, 15, 20, 21, 27)])
     made = unusual(plan, moved(read, rows, [0, 15 * SCATTER, 0]))
     (places,) = made.two_places
-    assert (places.of.pose, places.rows, made.wild) == ("P2", (7, 23), ())
+    assert (places.of.pose, places.rows, made.outlying) == ("P2", (7, 23), ())
     assert places.apart == pytest.approx(15 * SCATTER, rel=0.1)
     assert places.lines == tuple(sorted(read.line[rows].tolist()))
 
@@ -211,7 +216,7 @@ def test_rows_of_several_groups_that_are_off_alike_are_a_second_place() -> None:
     plan = dataclasses.replace(plan, tests=tuple(dataclasses.replace(t, cycles=6) for t in plan.tests))
     rows = np.array([rows_of(read, time=1e4 * group + 3)[0] for group in (0, 1, 3)])
     made = unusual(plan, moved(read, rows, [0, 40 * SCATTER, 0]))
-    assert (len(made.two_places), made.wild) == (1, ())
+    assert (len(made.two_places), made.outlying) == (1, ())
     assert made.two_places[0].rows == (3, 21)
     assert made.two_places[0].lines == tuple(read.line[rows].tolist())
 

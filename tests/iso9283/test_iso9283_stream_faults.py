@@ -64,7 +64,7 @@ def test_a_sample_where_no_tip_can_have_been_is_refused_by_its_line(rate: float)
     assert the(path_values(PLAN, fewer, HERE, TRACKER)[0], "AT").value < 0.1e-3
 
 
-def test_wild_samples_in_a_row_in_several_places_and_at_both_ends_are_named() -> None:
+def test_outlying_samples_in_a_row_in_several_places_and_at_both_ends_are_named() -> None:
     samples = runs()
     last = int((samples.cycle == 1).sum()) - 1
     stream = replace(samples, cycle=0 * samples.cycle, time=samples.time + 10.0 * samples.cycle)
@@ -78,7 +78,7 @@ def test_wild_samples_in_a_row_in_several_places_and_at_both_ends_are_named() ->
         assert words in refusal_of_path(moved(read, rows, 0.3))
 
 
-def test_a_record_that_jumps_and_stays_or_is_wild_all_over_is_refused() -> None:
+def test_a_record_that_jumps_and_stays_or_is_outlying_all_over_is_refused() -> None:
     samples = runs()
     text = refusal_of_path(moved(samples, slice(60, int((samples.cycle == 1).sum())), 0.03))
     assert "lines 61 and 62: cycle 1 of AT on line jumps" in text
@@ -89,7 +89,7 @@ def test_a_record_that_jumps_and_stays_or_is_wild_all_over_is_refused() -> None:
     assert "no tip can have been" in refusal_of_path(replace(samples, position=samples.position + off))
 
 
-def test_a_wild_sample_on_the_way_to_rest_is_refused() -> None:
+def test_a_outlying_sample_on_the_way_to_rest_is_refused() -> None:
     samples = resting()
     with pytest.raises(InputError, match=r"line 2802: cycle 3 of t at P1 has samples where no tip can have been"):
         settling_values(PLAN, moved(samples, [2800], 5e-3), HERE, EXACT)
@@ -154,20 +154,20 @@ def test_clean_streams_have_no_unusual_sample() -> None:
 
 def test_a_cycle_that_lies_apart_as_a_whole_is_said_with_what_is_without_it() -> None:
     samples = runs()
-    notice = said_of_paths(moved(samples, slice(0, int((samples.cycle == 1).sum())), 1e-3))["wild-cycle"]
+    notice = said_of_paths(moved(samples, slice(0, int((samples.cycle == 1).sum())), 1e-3))["outlying-cycle"]
     assert notice.level == "warning"
     assert "cycle 1 of AT on line by 0.99" in notice.message
     assert "RT is 1.1" in notice.message
     assert "without it 0.0" in notice.message
 
 
-def test_cycles_that_scatter_are_not_wild() -> None:
+def test_cycles_that_scatter_are_not_outlying() -> None:
     rng = np.random.default_rng(1)
     samples = runs(cycles=10, shape="small-circle")  # the shortest path
     for scale in (1e-5, 1e-3):
         for _ in range(20):
             off = scale * rng.standard_normal((11, 3))[samples.cycle]
-            assert "wild-cycle" not in said_of_paths(replace(samples, position=samples.position + off)), scale
+            assert "outlying-cycle" not in said_of_paths(replace(samples, position=samples.position + off)), scale
 
 
 def test_samples_that_are_missing_on_a_part_of_the_way_are_said() -> None:

@@ -120,7 +120,7 @@ def test_a_tool_attached_anew_before_every_pose_scatters(arm: Robot, plan: tuple
     assert np.abs(found - found.mean(axis=0)).max() > 1e-2  # poses, not one place
 
 
-def test_lag_comes_from_the_side_of_arrival(arm: Robot, plan: tuple[list[PlannedRow], Array]) -> None:
+def test_lag_comes_from_the_side_of_visit(arm: Robot, plan: tuple[list[PlannedRow], Array]) -> None:
     rows, joints = plan
     lag = 1e-4
     twin = Twin(arm, {1: JointTruth(hysteresis=lag)})

@@ -217,7 +217,7 @@ def test_another_plan_is_replaced_and_that_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", PLAN_FILES)
 def test_a_file_that_was_changed_or_is_foreign_stays(name: str, written: Path) -> None:
     plan_files_for(PLAN_FILES, written)
-    written.with_name(name).write_text("mended by hand\n")
+    written.with_name(name).write_text("corrected by hand\n")
     with pytest.raises(InputError, match=r"has been changed since.*Choose another `out`") as refusal:
         plan_files_for(PLAN_FILES, written)
     assert refusal.value.where == str(written.with_name(name))

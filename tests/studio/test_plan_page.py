@@ -127,7 +127,7 @@ def test_fields_are_kept_are_undone_and_shown_again(studio: Studio) -> None:
         ("poses", "", "a number of poses belongs here"),
     ],
 )
-def test_what_is_no_number_is_refused_below_its_field_and_stays_there_to_be_mended(
+def test_what_is_no_number_is_refused_below_its_field_and_stays_there_to_be_corrected(
     studio: Studio, name: str, value: str, words: str
 ) -> None:
     before = studio.window.project.settings

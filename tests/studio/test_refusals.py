@@ -93,7 +93,7 @@ def test_of_rows_that_are_gone_nothing_is_left(studio: Studio) -> None:
     assert below(studio.window, boxes._rows["box_1"].ranges[0]) == ""
 
 
-def test_a_text_that_is_refused_stays_to_be_mended_as_long_as_its_refusal_stands(studio: Studio) -> None:
+def test_a_text_that_is_refused_stays_to_be_corrected_as_long_as_its_refusal_stands(studio: Studio) -> None:
     calibrate, check = page(studio, CalibratePage), page(studio, CheckPage)
     typed(studio, calibrate._seed, "x")
     typed(studio, calibrate._train, "half")

@@ -23,7 +23,7 @@ from truearm.engine.robot.controller import JointsOf
 _FAR: Final = 6.0
 #: What is nearer to it than this always is one [m].
 _NEAR: Final = 2e-5
-#: More of them at the ends, as a share, and the target moved; more of them anywhere, and they are no wild ones.
+#: More of them at the ends, as a share, and the target moved; more of them anywhere, and they are no outlying ones.
 _MOVED: Final = 0.05
 _SET_ASIDE: Final = 0.2
 _LEAST_SAMPLES: Final = 5
@@ -285,7 +285,7 @@ def _refuse_motion(
         came += f"{1e3 * scatter:.3g} mm"
         if not moved:
             raise InputError(
-                "too many samples of a standstill are wild",
+                "too many samples of a standstill are outlying",
                 where=where,
                 came=came,
                 allowed=f"{100 * _SET_ASIDE:.0f} %",

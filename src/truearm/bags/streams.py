@@ -110,7 +110,7 @@ def _opened(bag: Path) -> Iterator[Any]:
             "the bag cannot be read",
             where=str(bag),
             came="a text that is no UTF-8" if "codec can't decode" in said else said,
-            cure="Mend it with the tools of ROS ('rosbag reindex', 'ros2 bag reindex'), or record it again.",
+            cure="Fix it with the tools of ROS ('rosbag reindex', 'ros2 bag reindex'), or record it again.",
         ) from error
 
 

@@ -49,9 +49,9 @@ from truearm.engine.data.thinning import readings_digest
 from truearm.engine.diagnose.base_changes import checked_parts, with_one_base
 from truearm.engine.diagnose.case import DOUBTED, PULLED, Case
 from truearm.engine.diagnose.data_check import notices_of
+from truearm.engine.diagnose.diagnosis import diagnose
 from truearm.engine.diagnose.gain import check_gain
 from truearm.engine.diagnose.held_places import check_held
-from truearm.engine.diagnose.judgement import judge
 from truearm.engine.diagnose.simulated_calibrations import (
     SimulatedCalibrations,
     check_linear,
@@ -385,7 +385,7 @@ def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Cal
         *parts.moved,
         *found.notices,
     )
-    judged = judge(
+    diagnosis = diagnose(
         Case(
             fit,
             parts.readings,
@@ -419,9 +419,9 @@ def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Cal
         nominal=errors_of(found.placed, parts.judges),
         train=train_errors,
         validation=validation,
-        expected=judged.expected,
-        warnings=(*judged.warnings, *told),
-        next=judged.next,
+        expected=diagnosis.expected,
+        warnings=(*diagnosis.warnings, *told),
+        next=diagnosis.next,
         data=parts.readings,
         training=parts.training,
         held_out=parts.held_out,

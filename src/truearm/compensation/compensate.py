@@ -345,7 +345,7 @@ def _refuse_skipped(result: CorrectedPrograms) -> None:
             f"{counted(len(skipped), 'target')} cannot be corrected, and the others would move without "
             f"{'it' if len(skipped) == 1 else 'them'} ({'; '.join(skipped[:_SHOWN])}{more})",
             parameter="programs",
-            cure="Check frame and tool; mend the program; leave a target as it is on purpose by its name with `keep`; "
+            cure="Check frame and tool; fix the program; leave a target as it is on purpose by its name with `keep`; "
             f"or accept all of them with `accept={SKIPPED}`.",
         )
 

@@ -144,7 +144,7 @@ class Recorded:
         )
 
     def _goes_on(self, known: Mapping[str, Any]) -> bool:
-        """Return whether the manifest is that of the record with entries mended, and robots added behind them."""
+        """Return whether the manifest is that of the record with entries corrected, and robots added behind them."""
         if self.manifest.experiment is not None or known.get("chunk") != self.manifest.chunk:
             return False
         try:
@@ -157,7 +157,7 @@ class Recorded:
     def alone(self) -> Iterator[Known]:
         """Let no other run work in the folder, and return what is done there; the lock ends with the process.
 
-        What is asked is written down where nothing stands there yet. Where entries of the manifest have been mended,
+        What is asked is written down where nothing stands there yet. Where entries of the manifest have been corrected,
         the parts that they are in are removed.
 
         Raises:
@@ -174,12 +174,12 @@ class Recorded:
             known = self._recorded()
             removed: tuple[str, ...] = ()
             if known is None or known.get("digest") != self.manifest.digest:
-                removed = self._remove_mended() if known is not None else ()
+                removed = self._remove_corrected() if known is not None else ()
                 write_text(self.folder / RECORD, json.dumps(self._record(), indent=1, default=str) + "\n")
             found = self.known()
             yield Known(found.done, (*removed, *found.again))
 
-    def _remove_mended(self) -> tuple[str, ...]:
+    def _remove_corrected(self) -> tuple[str, ...]:
         """Remove the parts with robots whose entries or files are others than they were computed from."""
         removed = []
         for part in self.on_disk():

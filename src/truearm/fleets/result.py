@@ -55,13 +55,13 @@ ROBOTS_IN_ERROR: Final = Rule(
     "robots-in-error",
     "warning",
     "results of some robots end with an error, as `calibrate` alone would say; no figure of the series contains them",
-    cure="Look at their reports first, mend their data or options, and run this again.",
+    cure="Look at their reports first, fix their data or options, and run this again.",
 )
 NO_RESULT: Final = Rule(
     "no-result",
     "error",
     "no robot has a result that can be used",
-    cure="Mend what their messages name, and run this again.",
+    cure="Fix what their messages name, and run this again.",
 )
 ROBOTS_OUTDATED: Final = Rule(
     "robots-outdated",

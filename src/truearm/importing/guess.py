@@ -167,7 +167,7 @@ def _refuse_canonical(path: Path, layout: GuessedLayout) -> None:
         raise InputError(
             "the columns are those of the canonical CSV, which needs no import",
             where=str(path),
-            cure="Use it as it is: truearm check says what is left to mend.",
+            cure="Use it as it is: truearm check says what is left to fix.",
         )
 
 

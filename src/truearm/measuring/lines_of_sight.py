@@ -15,7 +15,8 @@ from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.devices.device import Device
 from truearm.measuring.session import Session
 
-# Whether the readings of a plan reach as far as its configurations do: a slip with units shows, and nothing else.
+# Whether the readings of a plan reach as far as its configurations do: a data-entry error with units shows, and nothing
+# else.
 
 #: Of so many configurations the extent is compared, and it is told from so many times on.
 _FEWEST: Final = 3

@@ -48,7 +48,10 @@ class Refusals:
         return True
 
     def keep_typed(self, element: Any, value: Any) -> None:
-        """Let a field show what was typed as long as its refusal stands, so that it can be mended; None: no longer."""
+        """Let a field show what was typed as long as its refusal stands, so that it can be corrected.
+
+        None lets it no longer.
+        """
         for refusal in self._standing:
             if refusal.element is element:
                 refusal.typed = value

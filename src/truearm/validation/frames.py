@@ -24,7 +24,7 @@ from truearm.engine.robot.transform import Transform
 
 # Does a robot miss new readings by far more than its calibration said that it may.
 #
-# The calibration's proof holds the covariance of the parameters and the errors of the joints at an arrival. Both moved
+# The calibration's proof holds the covariance of the parameters and the errors of the joints at a visit. Both moved
 # to the new configurations, with the noise of the new readings, say how far these may be off.
 
 #: Errors over what the proof lets expect, as root mean squares, from which the proof does not hold here: of one draw

@@ -85,7 +85,7 @@ def test_closed_forms_of_one_joint(arm: Fit, tmp_path: Path) -> None:
     assert expected_error(loop).overall.mean < 1e-12  # a motion of everything does not count in a closed loop
 
 
-def test_an_error_of_every_arrival_is_in_the_error_to_expect_and_makes_it_a_lower_bound(arm: Fit) -> None:
+def test_an_error_of_every_visit_is_in_the_error_to_expect_and_makes_it_a_lower_bound(arm: Fit) -> None:
     fit = replace(arm, joint_error=np.array([1e-4]), weight=np.ones(10**6))
     found = expected_error(fit)
     assert found.remainder == pytest.approx(0.5e-4, rel=1e-3)
@@ -98,7 +98,7 @@ def test_an_error_of_every_arrival_is_in_the_error_to_expect_and_makes_it_a_lowe
 
 
 def test_joint_errors_count_as_far_as_the_residuals_allow() -> None:
-    """Errors of an arrival in all joints, found ten times too large."""
+    """Errors of a visit in all joints, found ten times too large."""
     twin, data = campaign("irb120", 40, 0.02e-3, 1)
     rng = np.random.default_rng(0)
     repeatability = np.radians(0.01)

@@ -20,11 +20,11 @@ from truearm.checking.check import check
 from truearm.engine.base.errors import Notice
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.arrivals import check_sigma
 from truearm.engine.diagnose.changes import check_changes, find_change
 from truearm.engine.diagnose.gain import check_gain, signed_rank_probability
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
 from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
+from truearm.engine.diagnose.visits import check_sigma
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import named_model

@@ -1,4 +1,4 @@
-"""Intervals of fits contain the truth as often as they say, whatever the readings of an arrival share."""
+"""Intervals of fits contain the truth as often as they say, whatever the readings of a visit share."""
 
 from __future__ import annotations
 

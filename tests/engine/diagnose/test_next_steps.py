@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.diagnose.test_arrival_lag import ON_A_TRACK
+from tests.engine.diagnose.test_visit_lag import ON_A_TRACK
 from tests.expecting import known
 from tests.simulated import campaign
 
@@ -57,10 +57,10 @@ def elastic(robot: str = "irb120", poses: int = POSES, worn: str = "", repeatabi
     return replace(measure(Twin(true, joints), reached, NOISE, rng), joints=q)
 
 
-def slipped(data: Dataset, slips: Sequence[tuple[int, int, float]]) -> Dataset:
+def slipped(data: Dataset, entry_errors: Sequence[tuple[int, int, float]]) -> Dataset:
     """Return data in which joints of configurations are written down wrong: index, joint from 1, and by how much."""
     joints = data.joints.copy()
-    for c, joint, degrees in slips:
+    for c, joint, degrees in entry_errors:
         joints[c, joint - 1] += np.radians(degrees)
     return replace(data, joints=joints)
 
@@ -244,8 +244,8 @@ def test_a_check_says_what_comes_next() -> None:
     (cure, go_on) = steps_after_check([Notice("joints-not-settled", "Wait longer.")])
     assert (cure.code, go_on.code, "joints-not-settled" in cure.message) == ("see-warning", "calibrate", True)
     assert [step.code for step in steps_after_check([Notice("missing", "Gaps.", "note")])] == ["calibrate"]
-    (mend,) = check("irb120", replace(elastic(), joints=np.degrees(elastic().joints))).next
-    assert (mend.code, "unit-angle" in mend.message) == ("mend-data", True)
+    (fix,) = check("irb120", replace(elastic(), joints=np.degrees(elastic().joints))).next
+    assert (fix.code, "unit-angle" in fix.message) == ("fix-data", True)
     _, rigid = campaign("irb120", 40, NOISE, 3)
     (good,) = check("irb120", rigid).next
     assert good.code == "calibrate"

@@ -155,14 +155,14 @@ def test_a_fit_of_other_parameters_or_that_began_wrong_is_judged_by_the_table() 
     assert [n.code for n in again.warnings if n.level == "error"] == ["wrong-robot"]
 
 
-def test_the_check_names_the_robot_where_a_slip_would_explain_it_too() -> None:
+def test_the_check_names_the_robot_where_a_entry_error_would_explain_it_too() -> None:
     for real, given in (("ur5", "ur10"), ("puma560", "irb120")):
         notices = check(given, campaign_of(load_robot(real), 30, 3)[1]).warnings
         assert [n.code for n in notices if n.level == "error"] == ["wrong-robot"]
         assert f"{real} of the library fits them" in notices[0].message
 
 
-def test_a_slip_is_not_another_robot() -> None:
+def test_a_entry_error_is_not_another_robot() -> None:
     data = campaign_of(UR10, 30, 3)[1]
     signs = np.array([1, 1, 1, -1, 1, 1])
     for spoilt in (replace(data, joints=data.joints * signs), replace(data, position=1e3 * data.position)):

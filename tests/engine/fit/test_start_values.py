@@ -264,7 +264,11 @@ def test_strings_and_fixtures_that_say_too_little_are_refused() -> None:
         start_from_readings(NOMINAL, data.of_readings(data.against != 1))
     few = data.against.copy()
     few[0] = len(data.fixtures)
-    for name, offered in (("cupp_1", True), ("cup_12", False), ("cup_x", False)):  # two on purpose, or a slip
+    for name, offered in (
+        ("cupp_1", True),
+        ("cup_12", False),
+        ("cup_x", False),
+    ):  # two on purpose, or a data-entry error
         with pytest.raises(InputError, match="measured too few times") as refusal:
             start_from_readings(NOMINAL, replace(data, fixture=few, fixtures=(*data.fixtures, name)))
         assert ("Did you mean cup_1?" in str(refusal.value)) == offered, name

@@ -15,7 +15,7 @@ from tests.simulated import campaign
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit import likelihood, problem
 from truearm.engine.fit.fit import Fit, identify
-from truearm.engine.fit.likelihood import Arrivals, Likelihood, Linearised, Moments, Whitening
+from truearm.engine.fit.likelihood import Likelihood, Linearised, Moments, Visits, Whitening
 from truearm.engine.fit.losses import Loss, pulls
 from truearm.engine.fit.models import MODELS
 from truearm.engine.fit.problem import Problem
@@ -26,13 +26,13 @@ from truearm.engine.robot.library import load_robot
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import measure
 
-ARRIVALS, READINGS = 12, 5
+VISITS, READINGS = 12, 5
 
 
 def one_way(between: float, seed: int = 0) -> Array:
-    """Return readings of one number ``(arrivals, readings)`` that share an error of one joint by arrival."""
+    """Return readings of one number ``(visits, readings)`` that share an error of one joint by visit."""
     rng = np.random.default_rng(seed)
-    return between * rng.standard_normal((ARRIVALS, 1)) + rng.standard_normal((ARRIVALS, READINGS))
+    return between * rng.standard_normal((VISITS, 1)) + rng.standard_normal((VISITS, READINGS))
 
 
 def components(readings: Array) -> Components:
@@ -45,20 +45,20 @@ def components(readings: Array) -> Components:
         by_joints=np.ones((len(y), 1)),
         offset=np.zeros(1),
         priors=False,
-        arrivals=Arrivals(np.repeat(np.arange(len(readings)), readings.shape[1])),
+        visits=Visits(np.repeat(np.arange(len(readings)), readings.shape[1])),
         factor=np.zeros(len(y), dtype=np.intp),
     )
     return variance_components(at, [True], np.array([1e-12]), [np.array([0])])
 
 
 def mean_squares(readings: Array) -> tuple[float, float]:
-    """Return the mean squares between and within arrivals of the analysis of variance."""
+    """Return the mean squares between and within visits of the analysis of variance."""
     means = readings.mean(axis=1)
     between = readings.shape[1] * float(np.var(means, ddof=1))
     return between, float(np.mean(np.var(readings, axis=1, ddof=1)))
 
 
-def test_equal_arrivals_give_the_estimates_of_the_analysis_of_variance() -> None:
+def test_equal_visits_give_the_estimates_of_the_analysis_of_variance() -> None:
     readings = one_way(1.5)
     between, within = mean_squares(readings)
     found = components(readings)
@@ -67,14 +67,14 @@ def test_equal_arrivals_give_the_estimates_of_the_analysis_of_variance() -> None
     assert found.weighing.joints[0] == pytest.approx((between - within) / READINGS, rel=1e-3)
 
 
-def test_the_mean_of_arrivals_is_as_uncertain_as_student_says() -> None:
+def test_the_mean_of_visits_is_as_uncertain_as_student_says() -> None:
     readings = one_way(1.5)
     between, _ = mean_squares(readings)
-    expected = np.sqrt(between / readings.size) * stdtrit(ARRIVALS - 1, 0.975) / 1.959964
+    expected = np.sqrt(between / readings.size) * stdtrit(VISITS - 1, 0.975) / 1.959964
     assert np.sqrt(components(readings).covariance[0, 0]) == pytest.approx(expected, rel=0.02)
 
 
-def test_arrivals_that_share_nothing_have_no_error_of_the_joints() -> None:
+def test_visits_that_share_nothing_have_no_error_of_the_joints() -> None:
     readings = one_way(0.0, 1)
     found = components(readings)
     assert found.likeliest.joints[0] == 0.0
@@ -89,7 +89,7 @@ def test_priors_are_integrated_out() -> None:
     z = A @ rng.standard_normal(6) + 0.8 * np.sum(G * rng.standard_normal((20, 3))[of_row], axis=1)
     z += np.where(np.arange(90) < 50, 1.0, 2.0) * rng.standard_normal(90)
     factor = (np.arange(90) >= 50).astype(np.intp)
-    at = Linearised(-z, A, G, np.zeros(6), True, Arrivals(of_row), factor)
+    at = Linearised(-z, A, G, np.zeros(6), True, Visits(of_row), factor)
     found = variance_components(at, [True, True], np.full(2, 1e-9), [np.array([0, 1]), np.array([2])])
 
     def likelihood(values: Array) -> float:
@@ -117,10 +117,10 @@ def test_priors_are_integrated_out() -> None:
 
 
 def test_the_likelihood_is_right_where_joints_err_by_far_more_than_readings() -> None:
-    """Readings of an arrival in three coordinates then say nothing of six joints but in three directions."""
+    """Readings of a visit in three coordinates then say nothing of six joints but in three directions."""
     rng = np.random.default_rng(5)
     A, G, z = rng.standard_normal((60, 4)), rng.standard_normal((60, 6)), rng.standard_normal(60)
-    at = Linearised(-z, A, G, np.zeros(4), True, Arrivals(np.repeat(np.arange(20), 3)), np.zeros(60, dtype=np.intp))
+    at = Linearised(-z, A, G, np.zeros(4), True, Visits(np.repeat(np.arange(20), 3)), np.zeros(60, dtype=np.intp))
     moments = Moments(at, 1)
     large, larger = (Likelihood(moments, np.ones(1), np.full(6, variance)) for variance in (1e6, 1e10))
     assert larger.likelihood - large.likelihood == pytest.approx(-0.5 * 20 * 3 * np.log(1e4), rel=1e-4)
@@ -131,23 +131,23 @@ def test_whitening_is_the_root_of_the_inverse() -> None:
     of_row = np.unique(rng.integers(0, 9, 40), return_inverse=True)[1]
     shared, rows = rng.standard_normal((40, 3)), rng.standard_normal((40, 4))
     V = np.eye(40) + (of_row[:, None] == of_row) * (shared @ shared.T)
-    whitening = Whitening(Arrivals(of_row), shared)
+    whitening = Whitening(Visits(of_row), shared)
     np.testing.assert_allclose(whitening.applied(whitening.applied(rows)), np.linalg.solve(V, rows), atol=1e-12)
 
 
-def test_scatter_of_equal_arrivals_is_that_of_their_means() -> None:
-    """Then the second estimator of Bell and McCaffrey is exact, with one degree of freedom less than arrivals."""
+def test_scatter_of_equal_visits_is_that_of_their_means() -> None:
+    """Then the second estimator of Bell and McCaffrey is exact, with one degree of freedom less than visits."""
     readings = one_way(2.0, 5)
     y = readings.reshape(-1)
     rows = np.ones((len(y), 1))
-    arrivals = Arrivals(np.repeat(np.arange(ARRIVALS), READINGS))
+    visits = Visits(np.repeat(np.arange(VISITS), READINGS))
     covariance, parts = cluster_covariance(
-        lambda: [(slice(None), rows, (y - y.mean())[:, None])], arrivals, np.array([True]), np.zeros(1)
+        lambda: [(slice(None), rows, (y - y.mean())[:, None])], visits, np.array([True]), np.zeros(1)
     )
-    variance = np.var(readings.mean(axis=1), ddof=1) / ARRIVALS
-    assert covariance[0, 0] == pytest.approx(variance * (stdtrit(ARRIVALS - 1, 0.975) / 1.959964) ** 2, rel=1e-6)
+    variance = np.var(readings.mean(axis=1), ddof=1) / VISITS
+    assert covariance[0, 0] == pytest.approx(variance * (stdtrit(VISITS - 1, 0.975) / 1.959964) ** 2, rel=1e-6)
     assert parts[0].covariance[0, 0] == pytest.approx(variance, rel=1e-6)
-    assert parts[0].freedom == pytest.approx(ARRIVALS - 1, rel=1e-6)
+    assert parts[0].freedom == pytest.approx(VISITS - 1, rel=1e-6)
 
 
 def test_pulls_follow_the_parameters_as_their_root_says() -> None:
@@ -173,7 +173,7 @@ IRB120 = load_robot("irb120")
 
 
 def readings(configurations: int = 24) -> Dataset:
-    """Return readings of three targets whose arrivals share errors of the joints."""
+    """Return readings of three targets whose visits share errors of the joints."""
     rng = np.random.default_rng(5)
     twin = truth_twin(IRB120, "tracker-triangular", rng)
     q = IRB120.random_configurations(configurations, rng)

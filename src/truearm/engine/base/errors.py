@@ -63,7 +63,7 @@ _MOST_COMPARED: Final = 2000
 
 
 class InputError(ValueError):
-    """Input that truearm refuses, with everything a person needs to mend it.
+    """Input that truearm refuses, with everything a person needs to fix it.
 
     Texts name parameters of a job in backticks (```seed```, ```train=all```), so that every caller can show them in its
     own words: Python as they are, the command as its options (:meth:`message`).

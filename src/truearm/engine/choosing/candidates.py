@@ -16,7 +16,7 @@ from truearm.engine.choosing.cross_validation import FOLDS, Folds, LinearFit
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.thinning import PARAMETERS_OF_A_PLACE, equations_of, evenly
 from truearm.engine.fit.curves import BANDS, LARGEST, curve_variances, moments_without
-from truearm.engine.fit.likelihood import Arrivals, Whitening
+from truearm.engine.fit.likelihood import Visits, Whitening
 from truearm.engine.fit.models import Model
 from truearm.engine.fit.problem import Problem
 from truearm.engine.fit.rounds import Solved, bound_by, in_the_middle
@@ -37,7 +37,7 @@ from truearm.engine.robot.robot import Robot
 # compliance by itself, and with it the moment. Beside a free curve of the same joint no load tells the two apart; the
 # informed share of the strength says so.
 
-#: Configurations under another load that are worth it; fewer may be a slip.
+#: Configurations under another load that are worth it; fewer may be a data-entry error.
 _ENOUGH: Final = 5
 #: Forces and moments that differ by less are the same load [N, N m].
 _SAME: Final = 1.0
@@ -216,7 +216,7 @@ class Ground:
         components = self.solved.components
         if components is None or not components.weighing.joints.any():
             return None
-        return Whitening(Arrivals(self.problem.arrivals), self._by_joints * np.sqrt(components.weighing.joints))
+        return Whitening(Visits(self.problem.visits), self._by_joints * np.sqrt(components.weighing.joints))
 
     @cached_property
     def _root_weight(self) -> Array:

@@ -460,7 +460,7 @@ class _Choice:
         """Return how fits with curves in the folds compare with those without; nothing where a fold has too few.
 
         The linear problem keeps the weights of the fit without curves, which takes what curves explain for errors of
-        every arrival: of few configurations it then gives curves too little.
+        every visit: of few configurations it then gives curves too little.
         """
         self.progress("choosing a model: fits with curves in the folds")
         refits = self._refits(search, chosen)

@@ -324,7 +324,7 @@ def check_maker(robot: Robot, language: Language, accept: tuple[str, ...]) -> li
         parameter="robot",
         where=robot.name,
         came=f"a robot of {robot.maker} and programs in {language.name}",
-        cure=f"{theirs}: give the calibration of the robot that runs them. If it is this one, mend the entry maker of "
+        cure=f"{theirs}: give the calibration of the robot that runs them. If it is this one, fix the entry maker of "
         f"its file, or give `accept={MAKER.code}`.",
     )
 

@@ -106,7 +106,7 @@ def _closer_together(data: Dataset) -> list[Notice]:
         found.append(
             UNIT_LENGTH(
                 f"The targets lie {how} at {named_configurations(data.labels, which)} than at the others: the "
-                "positions there, or those of the others, are in another unit of length. Mend their numbers.",
+                "positions there, or those of the others, are in another unit of length. Fix their numbers.",
                 at=tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in mine),
             )
         )
@@ -363,7 +363,7 @@ TARGET_MISSPELT: Final = Rule(
 
 
 def _misnamed(data: Dataset) -> list[Notice]:
-    """Say which names of targets seem to be slips.
+    """Say which names of targets seem to be misspelt.
 
     A target that is read at a few configurations, at all of which another one is missing that is read everywhere else,
     is that one, if the names are alike; and a configuration that has one target twice and another one not at all.
@@ -403,8 +403,8 @@ def _misnamed(data: Dataset) -> list[Notice]:
         return []
     return [
         TARGET_MISSPELT(
-            f"Names of targets look like slips: {'; '.join(found[:_MOST_NAMED])}. A misspelt name is a target of its "
-            "own. Correct the names.",
+            f"Names look misspelt: {'; '.join(found[:_MOST_NAMED])}. A misspelt name is a target of its own. "
+            "Correct the names.",
         )
     ]
 

@@ -28,7 +28,7 @@ LENGTH_FACTORS: Final = (
 FARTHEST: Final = 1e4
 #: A unit explains a position that it brings so many times nearer.
 _LEAST_IMPROVEMENT: Final = 10.0
-#: So many names, or runs of them, are listed: each of these rows must be mended.
+#: So many names, or runs of them, are listed: each of these rows must be corrected.
 _MOST_NAMED: Final = 60
 #: From so many on, configurations numbered one after the other are named by the first and the last.
 _LEAST_RUN: Final = 3
@@ -66,7 +66,7 @@ def lengths_noticed(data: Dataset, factor: Array) -> tuple[str, tuple[tuple[str,
         (data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in np.flatnonzero(factor != 1.0)
     )
     told = "; ".join(said)
-    return f"{told[0].upper()}{told[1:]}; those of the others are not. Mend the numbers of these rows", at
+    return f"{told[0].upper()}{told[1:]}; those of the others are not. Fix the numbers of these rows", at
 
 
 def length_notice(data: Dataset, factor: Array) -> Notice:

@@ -128,7 +128,7 @@ def repeated_joints_notices(data: Dataset, pairs: list[tuple[str, str]]) -> list
         JOINTS_REPEATED(
             f"{counted(len(pairs), 'configuration')} of {data.source} {'has' if len(pairs) == 1 else 'have'} the joint "
             f"positions of another one to the last digit, and readings more than {_LARGEST_CHANGE * 1e3:g} mm from "
-            f"its readings: {listed(words)}. The joint positions were copied: mend them, or leave these configurations "
+            f"its readings: {listed(words)}. The joint positions were copied: fix them, or leave these configurations "
             "out.",
             at=tuple((label, "") for pair in pairs for label in pair),
         )

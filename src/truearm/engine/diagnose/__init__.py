@@ -1,1 +1,1 @@
-"""What to know about data and fits: expected error, slips, sigma, what moved, gears, advice."""
+"""What to know about data and fits: expected error, data-entry errors, sigma, what moved, gears, advice."""

@@ -12,13 +12,13 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.rigid_tool import OUTLIERS, TARGET_MISTAKEN, TARGETS_SWAPPED
 from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import JOINTS_REPEATED
-from truearm.engine.diagnose.arrivals import check_sigma, check_sigma_beside_joints
 from truearm.engine.diagnose.changes import Change, notices_of_change, what_moved
 from truearm.engine.diagnose.expected_error import ExpectedError, as_residuals_allow, expected_error
 from truearm.engine.diagnose.far_off import PULLING
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
 from truearm.engine.diagnose.off_configurations import Off, off_configurations
 from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA, LeftOver
+from truearm.engine.diagnose.visits import check_sigma, check_sigma_beside_joints
 from truearm.engine.diagnose.wrong_robot import (
     IMPLAUSIBLE,
     WRONG_ROBOT,
@@ -71,7 +71,7 @@ class Case:
         return [] if self.moved is None else notices_of_change(*self.moved)
 
     @cached_property
-    def bent(self) -> bool:
+    def biased(self) -> bool:
         """Whether wrong readings pulled the fit away: it leaves much and expects much, whatever the model."""
         return self.fit.loss in PULLED and any(notice.code in PULLING for notice in self.noticed)
 
@@ -92,7 +92,7 @@ class Case:
     def of_robot(self) -> tuple[list[Notice], list[Notice]]:
         """Whether it can be this robot at all, and whether its lengths are this one's."""
         told = [notice for notice in self.noticed if notice.code == WRONG_ROBOT.code]
-        other = check_robot(self.fit, self.training) if judges_lengths(self.fit) and not self.bent else told
+        other = check_robot(self.fit, self.training) if judges_lengths(self.fit) and not self.biased else told
         if has_error([*self.of_data, *self.changes]):  # what is wrong with the data bends the robot too
             other = []
         unlike = check_plausible(self.fit, self.training, (*self.of_data, *other, *told))
@@ -126,5 +126,5 @@ class Case:
         """Return the notices but those that say nothing beside the others, by what their rules say."""
         silencing = {notice.code for notice in told}
         silencing |= {WRONG_DATA} if has_error([*self.of_data, *self.of_robot[0], *self.of_robot[1]]) else set()
-        silencing |= {PULLED_AWAY} if self.bent else set()
+        silencing |= {PULLED_AWAY} if self.biased else set()
         return [notice for notice in told if notice.rule is None or notice.rule.unless.isdisjoint(silencing)]

@@ -34,7 +34,7 @@ from truearm.engine.robot.chain import Array
 Kind = Literal["instrument-moved", "target-moved", "joint-zero-jumped", "drift"]
 
 #: Configurations that a change must leave on either side.
-LEAST_ARRIVALS: Final = 10
+LEAST_VISITS: Final = 10
 #: A change is believed if chance would show one as large anywhere less often than this.
 _LARGEST_CHANCE: Final = 1e-4
 #: Share of the squared residuals that a change must explain to be told, and to spoil the result. What a model cannot
@@ -81,7 +81,7 @@ def find_change(left: LeftOver) -> Change | None:
     """
     data = left.problem.data
     n = data.configurations
-    if data.fixture is not None or n < 2 * LEAST_ARRIVALS:
+    if data.fixture is not None or n < 2 * LEAST_VISITS:
         return None
     hypotheses = list(_hypotheses(left))
     residual = left.without_parameters(left.residual)
@@ -97,7 +97,7 @@ def find_change(left: LeftOver) -> Change | None:
     place[order] = np.arange(n)
     rows = np.argsort(place[left.configuration], kind="stable")
     at = place[left.configuration][rows]
-    every = np.arange(LEAST_ARRIVALS, n - LEAST_ARRIVALS + 1)
+    every = np.arange(LEAST_VISITS, n - LEAST_VISITS + 1)
     used = sorted({column for _, _, columns in hypotheses for column in columns})
     where = {column: i for i, column in enumerate(used)}
     C, r, Q = left.jacobian[rows][:, used], residual[rows], left.basis[rows]
@@ -229,7 +229,7 @@ def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
 
 def is_a_part(off: Off) -> bool:
     """Return whether what is off is a part of the campaign, so long that its beginning can be found."""
-    return off.in_a_row and len(off.configurations) >= LEAST_ARRIVALS
+    return off.in_a_row and len(off.configurations) >= LEAST_VISITS
 
 
 INSTRUMENT_MOVED: Final = Rule(

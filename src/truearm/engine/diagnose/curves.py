@@ -216,7 +216,7 @@ OUTLIERS_ONE_SIDED: Final = Rule(
 #
 # Losses such as Huber's are right on average where outliers scatter to all sides. Outliers that lie to one side pull
 # the fit along, by less than they would pull least squares, and no interval contains that bias. The sides are compared
-# by arrival with what chance does to directions in space (Rayleigh's test; Mardia and Jupp 2000, "Directional
+# by visit with what chance does to directions in space (Rayleigh's test; Mardia and Jupp 2000, "Directional
 # statistics", section 10.4.1).
 def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
     """Return a notice if positions that a loss holds back lie to one side.
@@ -229,11 +229,11 @@ def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
         return []
     off = -errors_of(fit.robot, data).position_errors[held]
     towards = off / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-300)
-    arrivals = np.unique(data.configuration[held], return_inverse=True)[1].reshape(-1)
-    count = np.bincount(arrivals)
+    visits = np.unique(data.configuration[held], return_inverse=True)[1].reshape(-1)
+    count = np.bincount(visits)
     if len(count) < _LEAST:
         return []
-    mean = np.stack([np.bincount(arrivals, weights=axis) / count for axis in towards.T], axis=1)
+    mean = np.stack([np.bincount(visits, weights=axis) / count for axis in towards.T], axis=1)
     together = mean.sum(axis=0)
     if 3.0 * float(together @ together) / float(np.sum(mean**2)) < _BEYOND_CHANCE:
         return []

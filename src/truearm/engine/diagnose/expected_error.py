@@ -72,7 +72,7 @@ class ExpectedError:
     #: The same without errors of the scale, where no length was measured: what more configurations can lower.
     without_scale: Expectation
     targets: dict[str, Expectation]  #: Of each, by its name.
-    #: Error of each joint in every arrival that is in it, a standard deviation [rad or m]: repeatability plus what the
+    #: Error of each joint in every visit that is in it, a standard deviation [rad or m]: repeatability plus what the
     #: model leaves.
     joint_error: Array
     remainder: float  #: Root mean square of what that does to the targets.
@@ -279,7 +279,7 @@ def _expectation(lengths: Array) -> Expectation:
 
 
 def _remainder(fit: Fit, joints: Array | Postures) -> float:
-    """Return the root mean square error of the targets that the joints' error of an arrival makes [m]."""
+    """Return the root mean square error of the targets that the joints' error of a visit makes [m]."""
     if not fit.joint_error.any():
         return 0.0
     at = fit.robot.loaded(joints)

@@ -26,14 +26,14 @@ from truearm.engine.data.rigid_tool import (
 )
 from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import repeated_joints
-from truearm.engine.diagnose.slip_trials import (
-    ORIENTATION_SLIPS,
+from truearm.engine.diagnose.entry_error_trials import (
+    ORIENTATION_ENTRY_ERRORS,
     UNIT_ANGLE,
-    Slip,
-    angle_slips,
+    EntryError,
+    angle_entry_errors,
     as_noted,
-    sign_slips,
-    slips_in_rows,
+    entry_errors_in_rows,
+    sign_entry_errors,
 )
 from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.chain import Array
@@ -76,7 +76,7 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
     doubted = np.setdiff1d(doubted, np.flatnonzero(lengths != 1.0))
     scaled = [length_notice(data, lengths)] if (lengths != 1.0).any() else []
     mistaken = _joints_of_others(data, predicted, doubted, allowed)
-    angled, slips = _in_another_unit(fit, data, off, doubted, allowed, [*mistaken])
+    angled, entries = _in_another_unit(fit, data, off, doubted, allowed, [*mistaken])
     turned_round = _of_another_sign(fit, data, off, doubted, allowed, [*mistaken, *angled])
     points, known = places_of(data), fixed_points(data)
     repeated = {label for pair in repeated_joints(data) for label in pair}
@@ -91,7 +91,7 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
             unlike[c] = float(off[mine].max())
         else:
             suspects += of_this
-    return [*scaled, *slips, *_joints_mistaken(data, mistaken, turned_round, unlike)], suspects
+    return [*scaled, *entries, *_joints_mistaken(data, mistaken, turned_round, unlike)], suspects
 
 
 def _doubted(
@@ -136,7 +136,7 @@ def _hang_together(
 
 
 def _in_another_length(data: Dataset, predicted: Array, doubted: IntArray, allowed: float) -> tuple[Dataset, Array]:
-    """Return the data with positions in another unit of length mended, and by what factors, ``(readings,)``.
+    """Return the data with positions in another unit of length corrected, and by what factors, ``(readings,)``.
 
     Args:
         predicted: Places of the targets [m], ``(configurations, targets, 3)``.
@@ -160,11 +160,11 @@ def _in_another_unit(
     """
     found: dict[str, list[int]] = {}
     explained: set[int] = set()
-    for slip, fitting in _explained_by(fit, data, off, doubted, allowed, left_out, angle_slips):
+    for entry, fitting in _explained_by(fit, data, off, doubted, allowed, left_out, angle_entry_errors):
         new = [c for c in fitting if c not in explained]
         explained.update(new)
         if new:
-            found.setdefault(slip.words.partition(".")[0], []).extend(new)
+            found.setdefault(entry.words.partition(".")[0], []).extend(new)
     return explained, [
         UNIT_ANGLE(
             f"{words}, at some configurations alone ({listed([data.labels[c] for c in sorted(cs)])}).",
@@ -179,8 +179,8 @@ def _of_another_sign(
 ) -> dict[int, int]:
     """Return the configurations whose readings fit with the opposite sign of one joint alone, and its number from 1."""
     found: dict[int, list[int]] = {}
-    slips = _explained_by(fit, data, off, doubted, allowed, left_out, sign_slips)
-    for number, (_, fitting) in enumerate(slips, 1):
+    entries = _explained_by(fit, data, off, doubted, allowed, left_out, sign_entry_errors)
+    for number, (_, fitting) in enumerate(entries, 1):
         for c in fitting:
             found.setdefault(c, []).append(number)
     return {c: numbers[0] for c, numbers in found.items() if len(numbers) == 1}
@@ -193,9 +193,9 @@ def _explained_by(
     doubted: IntArray,
     allowed: float,
     left_out: list[int],
-    slips: Callable[[Dataset], Iterator[Slip]],
-) -> Iterator[tuple[Slip, list[int]]]:
-    """Return slips with joint positions, and the configurations whose readings each of them explains."""
+    entries: Callable[[Dataset], Iterator[EntryError]],
+) -> Iterator[tuple[EntryError, list[int]]]:
+    """Return data-entry errors with joint positions, and the configurations whose readings each of them explains."""
     read = np.bincount(data.configuration[data.has_position], minlength=data.configurations)
     wrong = np.bincount(data.configuration[doubted], minlength=data.configurations)
     some = np.setdiff1d(np.flatnonzero((wrong > 0) & (wrong == read)), left_out)[:_MOST_LOOKED_AT]
@@ -203,12 +203,12 @@ def _explained_by(
         return
     part = data.of_configurations(some)
     off_most = [float(np.nanmax(off[data.configuration == c])) for c in some.tolist()]
-    for slip in as_noted(fit.robot, part, slips):
-        places = [fit.robot.world_poses(slip.data.postures, name)[0] for name in part.targets]
+    for entry in as_noted(fit.robot, part, entries):
+        places = [fit.robot.world_poses(entry.data.postures, name)[0] for name in part.targets]
         gaps = np.linalg.norm(np.stack(places, axis=1)[part.configuration, part.target] - part.position, axis=1)
         gap = [float(gaps[(part.configuration == i) & part.has_position].max()) for i in range(len(some))]
         least = [min(allowed, most / _LEAST_IMPROVEMENT) for most in off_most]
-        yield slip, [c for i, c in enumerate(some.tolist()) if gap[i] <= least[i]]
+        yield entry, [c for i, c in enumerate(some.tolist()) if gap[i] <= least[i]]
 
 
 JOINTS_MISTAKEN: Final = Rule(
@@ -235,14 +235,13 @@ def _joints_mistaken(
         what = "readings of a configuration fit" if len(words) == 1 else "readings of configurations fit"
         found.append(
             f"The {what} the joint positions of another one: {listed(words)}. Their rows were exchanged or copied: "
-            "mend the joint positions, or leave them out."
+            "fix the joint positions, or leave them out."
         )
     if signs:
         words = [f"{data.labels[c]} (joint {number})" for c, number in signs.items()]
         what = f"configuration{'' if len(words) == 1 else 's'} {listed(words)}"
         found.append(
-            f"The readings of {what} fit with the opposite sign of this joint: mend it in these rows, or leave them "
-            "out."
+            f"The readings of {what} fit with the opposite sign of this joint: fix it in these rows, or leave them out."
         )
     if unlike:
         words = [f"{data.labels[c]} ({millimetres(size)} mm off)" for c, size in unlike.items()]
@@ -250,7 +249,7 @@ def _joints_mistaken(
         found.append(
             f"The joint positions of {what} do not belong to their readings: all of these are off, and stand to each "
             "other as they should. The joint positions are wrong, or the row is another one's, or the robot or the "
-            "instrument was moved for it. Mend the joint positions, or leave these rows out."
+            "instrument was moved for it. Fix the joint positions, or leave these rows out."
         )
     at = tuple((data.labels[c], "") for c in (*others, *signs, *unlike))
     return [JOINTS_MISTAKEN(" ".join(found), at=at)] if found else []
@@ -313,7 +312,7 @@ ORIENTATION_OUTLIERS: Final = Rule(
 )
 #: Codes of wrong readings that pull a fit away.
 PULLING: Final = frozenset(
-    rule.code for rule in (ORIENTATION_OUTLIERS, *ORIENTATION_SLIPS, JOINTS_MISTAKEN, UNIT_ANGLE)
+    rule.code for rule in (ORIENTATION_OUTLIERS, *ORIENTATION_ENTRY_ERRORS, JOINTS_MISTAKEN, UNIT_ANGLE)
 )
 #: An orientation is doubted if it is at least so far off [rad].
 _LEAST_TURNED: Final = math.radians(0.5)
@@ -350,24 +349,24 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
     for t in np.unique(data.target[rows]).tolist():
         mine = data.target[rows] == t
         predicted[mine] = fit.robot.world_poses(data.postures, data.targets[t])[1][data.configuration[rows[mine]]]
-    mended, rule, words = slips_in_rows(data.quaternion[rows], predicted)
+    corrected, rule, words = entry_errors_in_rows(data.quaternion[rows], predicted)
     at = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in rows.tolist()]
     where = ["/".join(one) for one in at]
     found = []
-    if mended.any():
-        some = listed([name for name, one in zip(where, mended.tolist(), strict=True) if one])
+    if corrected.any():
+        some = listed([name for name, one in zip(where, corrected.tolist(), strict=True) if one])
         found.append(
             rule(
                 f"Some orientations do not turn as the robot does (configuration/target): {some}. They would if their "
-                f"numbers were read otherwise: {words}. Those of the other readings are right. Mend these rows.",
+                f"numbers were read otherwise: {words}. Those of the other readings are right. Fix these rows.",
                 "error",
-                at=tuple(one for one, known in zip(at, mended.tolist(), strict=True) if known),
+                at=tuple(one for one, known in zip(at, corrected.tolist(), strict=True) if known),
             )
         )
-    if not mended.all():
+    if not corrected.all():
         size = np.linalg.norm(errors.orientation_errors[rows], axis=1).tolist()
         joint = [_as_if_turned(fit, data, r, errors.orientation_errors[r]) for r in rows.tolist()]
-        others = [f"{where[i]} ({degrees(size[i])} deg{joint[i]})" for i in np.flatnonzero(~mended).tolist()]
+        others = [f"{where[i]} ({degrees(size[i])} deg{joint[i]})" for i in np.flatnonzero(~corrected).tolist()]
         one = len(others) == 1
         what, them = ("orientation is", "it") if one else ("orientations are", "them")
         quaternions = "its quaternion" if one else "their quaternions"
@@ -375,7 +374,7 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
             ORIENTATION_OUTLIERS(
                 f"{len(others)} {what} far off, and the positions are not (configuration/target): {listed(others)}. "
                 f"Measure {them} again, or leave {quaternions} empty; `loss=cauchy` lets {them} count little.",
-                at=tuple(at[i] for i in np.flatnonzero(~mended).tolist()),
+                at=tuple(at[i] for i in np.flatnonzero(~corrected).tolist()),
             )
         )
     return found

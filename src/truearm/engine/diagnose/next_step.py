@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
+#: Codes of the release before, which JSON has beside those of this one.
+_FORMERLY: Final = {"fix-data": "mend-data"}
 #: More steps than this nobody takes at once.
 MOST: Final = 3
 
@@ -31,8 +33,10 @@ class NextStep:
 
     def summary(self) -> dict[str, Any]:
         """Return it as JSON holds it, the gain in mm."""
+        before = {"formerly": _FORMERLY[self.code]} if self.code in _FORMERLY else {}
         return {
             "code": self.code,
+            **before,
             "message": self.message,
             "gain_mm": None if self.gain is None else float(_mm(self.gain)),
         }

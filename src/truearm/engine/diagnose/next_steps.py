@@ -186,12 +186,12 @@ _CURED_FIRST: Final = (
     "payload-unlikely",
     "sigma-too-large",
     "transmission-error",
-    "large-remainder",
+    "large-residual",
     WORSE.code,
     NO_GAIN.code,
 )
 #: Those that any other step may explain.
-_EXPLAINED: Final = frozenset({WORSE.code, NO_GAIN.code, "large-remainder"})
+_EXPLAINED: Final = frozenset({WORSE.code, NO_GAIN.code, "large-residual"})
 #: Those that configurations which are off explain.
 _OF_CONFIGURATIONS: Final = frozenset(
     {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", WORSE.code, NO_GAIN.code}
@@ -200,10 +200,10 @@ _OF_CONFIGURATIONS: Final = frozenset(
 
 def steps_after_fit(case: Case, notices: Sequence[Notice]) -> tuple[NextStep, ...]:
     """Return at most three things to do after a fit, the most useful first; one at least."""
-    first = _to_mend(notices)
+    first = _to_fix(notices)
     if case.status in (Status.NOT_CONVERGED, Status.IMPLAUSIBLE):
-        first = first or [NextStep("mend-data", case.status.advice)]
-    if case.bent and any(notice.code == ORIENTATION_OUTLIERS.code for notice in notices):
+        first = first or [NextStep("fix-data", case.status.advice)]
+    if case.biased and any(notice.code == ORIENTATION_OUTLIERS.code for notice in notices):
         first = first or _cures([n for n in notices if n.code == ORIENTATION_OUTLIERS.code], [])
     if first:
         return tuple(first)
@@ -240,9 +240,9 @@ def steps_after_check(
         errors: Of that fit.
         robot: Whether the data were compared with a robot.
     """
-    mend = _to_mend(notices)
-    if mend:
-        return tuple(mend)
+    fix = _to_fix(notices)
+    if fix:
+        return tuple(fix)
     steps: list[NextStep] = []
     if left is not None and errors is not None:
         off = off_configurations(left)
@@ -295,13 +295,13 @@ def _known(errors: Errors) -> float:
     return 0.0 if spread is None else spread.mean
 
 
-def _to_mend(notices: Sequence[Notice]) -> list[NextStep]:
-    """Return the step that mends what makes all other advice worthless."""
+def _to_fix(notices: Sequence[Notice]) -> list[NextStep]:
+    """Return the step that fixes what makes all other advice worthless."""
     codes = list(dict.fromkeys(n.code for n in notices if n.level == "error" and n.code not in _OWN_STEP))
     if not codes:
         return []
     what = "the error" if len(codes) == 1 else "the errors"
-    return [NextStep("mend-data", f"Mend first what {what} {listed(codes)} names: nothing else can be judged before.")]
+    return [NextStep("fix-data", f"Fix first what {what} {listed(codes)} names: nothing else can be judged before.")]
 
 
 def _cures(notices: Sequence[Notice], steps: Sequence[NextStep]) -> list[NextStep]:

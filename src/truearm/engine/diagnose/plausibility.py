@@ -1,4 +1,4 @@
-"""Is the data believable for this robot: slips with units, signs and orders, limits, and readings far off."""
+"""Is the data believable for this robot: data-entry errors, joint limits, and readings far off."""
 
 from __future__ import annotations
 
@@ -18,7 +18,14 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.rigid_tool import OUTLIERS, TARGETS_SWAPPED, Suspect, places_of
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.arrivals import ArrivalLikelihood, joints_as_far_off
+from truearm.engine.diagnose.entry_error_trials import ORIENTATION_ENTRY_ERRORS
+from truearm.engine.diagnose.entry_errors import (
+    FIXTURES_UNLIKELY,
+    entry_errors_by_fit,
+    entry_errors_in_lengths,
+    entry_errors_in_positions,
+    off_by,
+)
 from truearm.engine.diagnose.far_off import (
     allowed_off,
     check_orientations,
@@ -28,9 +35,8 @@ from truearm.engine.diagnose.far_off import (
     without_orientations,
 )
 from truearm.engine.diagnose.narrow_data import check_few_to_doubt
-from truearm.engine.diagnose.slip_trials import ORIENTATION_SLIPS
-from truearm.engine.diagnose.slips import FIXTURES_UNLIKELY, off_by, slips_by_fit, slips_in_lengths, slips_in_positions
 from truearm.engine.diagnose.unmodelled import LeftOver
+from truearm.engine.diagnose.visits import VisitLikelihood, joints_as_far_off
 from truearm.engine.diagnose.wrong_robot import check_plausible, check_robot, other_robot
 from truearm.engine.fit.fit import Fit, identify, place
 from truearm.engine.fit.models import named_model
@@ -170,7 +176,7 @@ def check_rounding(fit: Fit, data: Dataset) -> list[Notice]:
     seeming = joints_as_far_off(left)
     if not _ALIKE_JOINT_ROUNDING[0] * by_rounding <= seeming <= _ALIKE_JOINT_ROUNDING[1] * by_rounding:
         return []
-    readings = ArrivalLikelihood.of(left)
+    readings = VisitLikelihood.of(left)
     turning = np.array([joint.kind == "revolute" for joint in fit.robot.joints], dtype=float)
     rounded = readings.largest(joints=by_rounding**2 * turning)[1]
     if 2.0 * (rounded - readings.largest(joints=0.0 * turning)[1]) < _LEAST_GAIN:
@@ -186,7 +192,7 @@ def check_rounding(fit: Fit, data: Dataset) -> list[Notice]:
 #: Two targets are one point if they are nearer each other than this [m], or than so many deviations.
 _SAME_TARGET: Final = 5e-5
 _SAME_DEVIATIONS: Final = 4.0
-#: How like names are that a slip takes for each other, and among how many targets they are looked for.
+#: How like names are that a data-entry error takes for each other, and among how many targets they are looked for.
 _LIKE: Final = 0.75
 _MOST_TARGETS: Final = 40
 #: A fit whose median reading is off by less than this needs no explanation [m].
@@ -223,28 +229,28 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
             start_from_readings(robot, data)
         except InputError as error:
             return Comparison([FIXTURES_UNLIKELY(str(error)), *notices])
-        slips = slips_in_lengths(robot, data)
-        if slips:
-            return Comparison([*slips, *notices])
+        entries = entry_errors_in_lengths(robot, data)
+        if entries:
+            return Comparison([*entries, *notices])
         fit = identify(robot, data, named_model("geometric"), loss="cauchy")
         unlike, off_fixtures = _far_from_fixtures(fit, data)
         return Comparison([*check_robot(fit, data), *unlike, *notices], off_fixtures, fit, data)
     if not data.has_position.any():
         return Comparison(notices)
-    slips = slips_in_positions(robot, data)
-    if slips and all(
-        slip.code in {rule.code for rule in ORIENTATION_SLIPS} for slip in slips
+    entries = entry_errors_in_positions(robot, data)
+    if entries and all(
+        entry.code in {rule.code for rule in ORIENTATION_ENTRY_ERRORS} for entry in entries
     ):  # the positions are this robot's
-        return Comparison([*slips, *notices])
-    if slips:
-        return Comparison([*(other_robot(robot, data) or slips), *notices])
+        return Comparison([*entries, *notices])
+    if entries:
+        return Comparison([*(other_robot(robot, data) or entries), *notices])
     fit = identify(robot, data, named_model("geometric"), loss="cauchy")
     errors = errors_of(fit.robot, data)
     off = off_by(errors)
     if np.nanmedian(off) > _FITTED_WITHIN:
-        slips = slips_by_fit(robot, data)
-        if slips:
-            return Comparison([*(other_robot(robot, data) or slips), *notices])
+        entries = entry_errors_by_fit(robot, data)
+        if entries:
+            return Comparison([*(other_robot(robot, data) or entries), *notices])
     wrong = check_robot(fit, data)
     unlike_robot = check_plausible(fit, data, wrong)
     exchanged = exchanged_names(fit, data)
@@ -404,6 +410,6 @@ def _some(data: Dataset) -> list[tuple[int, str]]:
 
 
 def _like(one: str, other: str) -> bool:
-    """Return whether names differ by a slip: not by a number, as those of a row of targets do."""
+    """Return whether names differ by a data-entry error: not by a number, as those of a row of targets do."""
     same_numbers = re.findall("[0-9]+", one) == re.findall("[0-9]+", other)
     return same_numbers and SequenceMatcher(None, one.casefold(), other.casefold()).ratio() >= _LIKE

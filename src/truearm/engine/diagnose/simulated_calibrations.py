@@ -4,7 +4,7 @@ The intervals of a fit are linear: covariances at its solution. Here the robot t
 again at the training configurations, with noise and errors of the joints as the fit found them, begins each time from a
 nominal robot that is off from it as the priors say, and is calibrated by Gauss-Newton steps with derivatives of its
 own. What the estimates miss the truth by needs no linearity (JCGM 101:2008). Where errors of the joints do not explain
-how residuals hang together, the residuals of each arrival themselves are drawn, all of them with one random sign (a
+how residuals hang together, the residuals of each visit themselves are drawn, all of them with one random sign (a
 wild bootstrap by clusters, Cameron, Gelbach and Miller 2008). Many trials are a leading axis of the
 parameter values, as in :mod:`truearm.fleets.series`.
 """
@@ -25,7 +25,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.diagnose.expected_error import PositionErrors, moved_lengths
 from truearm.engine.fit.fit import Fit
-from truearm.engine.fit.likelihood import Arrivals, Whitening
+from truearm.engine.fit.likelihood import Visits, Whitening
 from truearm.engine.fit.models import Model
 from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array
@@ -73,7 +73,7 @@ class SimulatedCalibrations:
     linear_deviation: Array
     error: Array  #: Estimate minus truth in each trial that settled [SI], ``(trials, parameters)``.
     #: Standard deviations that each of these trials states [SI], likewise; those of the fit where its covariance
-    #: follows from the scatter of the arrivals.
+    #: follows from the scatter of the visits.
     stated: Array
     asked: int  #: How many trials were made.
     seed: int  #: Of the trials.
@@ -174,15 +174,15 @@ def _of_itself(
     noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
     free = FreeParameters(tuple(fit.robot.parameters[name] for name in fit.free.names))
     problem = Problem(fit.robot, data, free, noise, priors, fit.excess)
-    arrivals = problem.arrivals
+    visits = problem.visits
     if fit.scattered:
         residual = problem.at(free.start).residual
         taken = sum(p.informed or 0.0 for p in free.parameters)
         residual = residual * math.sqrt(problem.rows / max(problem.rows - taken, 1.0))
 
         def signed(rng: np.random.Generator, count: int) -> Array:
-            sign = rng.choice([-1.0, 1.0], (count, int(arrivals.max()) + 1))
-            return np.asarray(residual * sign[:, arrivals])
+            sign = rng.choice([-1.0, 1.0], (count, int(visits.max()) + 1))
+            return np.asarray(residual * sign[:, visits])
 
         return problem, None, signed
     if not fit.joint_error.any():
@@ -190,12 +190,12 @@ def _of_itself(
     shared = problem.at(free.start).by_joints * fit.joint_error
 
     def scatter(rng: np.random.Generator, count: int) -> Array:
-        joints = rng.standard_normal((count, int(arrivals.max()) + 1, shared.shape[1]))
+        joints = rng.standard_normal((count, int(visits.max()) + 1, shared.shape[1]))
         return np.asarray(
-            rng.standard_normal((count, problem.rows)) + np.einsum("rj,trj->tr", shared, joints[:, arrivals])
+            rng.standard_normal((count, problem.rows)) + np.einsum("rj,trj->tr", shared, joints[:, visits])
         )
 
-    return problem, Whitening(Arrivals(arrivals), shared), scatter
+    return problem, Whitening(Visits(visits), shared), scatter
 
 
 def _calibrated(

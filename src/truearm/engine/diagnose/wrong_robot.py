@@ -148,7 +148,7 @@ def check_plausible(fit: Fit, data: Dataset, others: Iterable[Notice] = ()) -> l
     cure = (
         "Check that it is this robot, and units, joint order, signs and targets of the data."
         if cause is None
-        else f"The cause is most likely what {cause} says; mend that and calibrate again."
+        else f"The cause is most likely what {cause} says; fix that and calibrate again."
     )
     return [IMPLAUSIBLE(f"What was fitted cannot be this robot: {why}. {cure}")]
 
@@ -216,7 +216,7 @@ class Lengths:
         """Find them for a fit and the readings it was made from.
 
         The fit is taken one linear step further, to where the priors of all but lengths are wider. Parameters that it
-        held for being redundant are free again, those at a bound stay. Errors of the joints that readings of an arrival
+        held for being redundant are free again, those at a bound stay. Errors of the joints that readings of a visit
         share are taken for errors of single readings.
         """
         robot = fit.robot
@@ -362,7 +362,7 @@ def _check_growth(robot: Robot, lengths: Lengths) -> list[Notice]:
 def other_robot(robot: Robot, data: Dataset) -> list[Notice]:
     """Return a notice if a robot of the library fits readings that are nothing like this one's.
 
-    What looks like a slip with units or signs may be another robot: a smaller arm of the same make reads as this one in
+    What looks like another unit or sign may be another robot: a smaller arm of the same make reads as this one in
     another unit.
     """
     better = _Better.of(robot, data)

@@ -11,7 +11,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.fit.likelihood import Arrivals, Whitening
+from truearm.engine.fit.likelihood import Visits, Whitening
 from truearm.engine.fit.problem import Problem
 from truearm.engine.fit.variance_components import CovariancePart
 from truearm.engine.robot.chain import Array
@@ -473,7 +473,7 @@ class Curves:
     #: The variance of every coefficient that has the largest likelihood [rad^2], in the order of `places`.
     likeliest: Array = field(default_factory=lambda: np.zeros(0))
     #: By what the variances of the readings are larger, for the curves' sake, than their residuals (Kish 1965): where
-    #: errors of the joints at an arrival explain nothing, its readings count as one of three coordinates, and hold the
+    #: errors of the joints at a visit explain nothing, its readings count as one of three coordinates, and hold the
     #: curves no better.
     design_effect: float = 1.0
     #: What the curve of each joint gains in log-likelihood, by the index of the joint.
@@ -527,7 +527,7 @@ def with_stiffness(
     coefficients = [robot.parameters[name] for name in names]
     crowd = 1.0
     if not joints.any():
-        crowd = max(1.0, problem.rows / (_COORDINATES * (int(problem.arrivals.max(initial=0)) + 1)))
+        crowd = max(1.0, problem.rows / (_COORDINATES * (int(problem.visits.max(initial=0)) + 1)))
     of = curve_moments(problem, curves, joints, weight, crowd)
     declared = any(block.declared for block in problem.blocks)
     found = curve_variances(
@@ -588,7 +588,7 @@ def curve_moments(problem: Problem, curves: Curves, joints: Array, weight: Array
     prior = np.array([p.prior for p in others])
     whitening = None
     if joints.any():
-        whitening = Whitening(Arrivals(whole.arrivals), here.by_joints * np.sqrt(joints))
+        whitening = Whitening(Visits(whole.visits), here.by_joints * np.sqrt(joints))
     root = np.sqrt(np.repeat(weight, whole.components) / crowd)
     away = whole.free.start - whole.free.nominal
     moments = np.zeros((len(away) + 1, len(away) + 1))

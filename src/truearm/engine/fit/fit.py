@@ -15,7 +15,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.curves import parts_with_curves
 from truearm.engine.fit.held import NOTHING_HELD, Held
-from truearm.engine.fit.likelihood import Arrivals
+from truearm.engine.fit.likelihood import Visits
 from truearm.engine.fit.losses import ABSOLUTE, Loss, pulls, scales_of_pulls
 from truearm.engine.fit.models import FRAMES, Model
 from truearm.engine.fit.problem import (
@@ -147,7 +147,7 @@ class Fit:
     status: Status  #: How the fit ended.
     free: FreeParameters  #: The parameters that were identified, in the order of `covariance`.
     #: Of the free parameters [SI], ``(parameters, parameters)``. An interval of 1.96 deviations to both sides is of 95
-    #: %: where variances are known from few readings, it is as much wider as one of Student's t. Readings of an arrival
+    #: %: where variances are known from few readings, it is as much wider as one of Student's t. Readings of a visit
     #: may hang together. Outliers that lie to one side bias a robust fit, and the covariance does not contain that.
     covariance: Array
     #: The covariance by its sources, and without what their variances are uncertain by; of the free parameters and,
@@ -170,12 +170,12 @@ class Fit:
     #: How much larger the residuals are than the declared deviations allow; 1 if they agree or nothing was declared.
     #: The covariance contains it. Parameters at a bound are not uncertain in it.
     excess: float
-    #: Standard deviation of the error of each joint that all readings of an arrival share, ``(joints,)`` [rad or m]:
+    #: Standard deviation of the error of each joint that all readings of a visit share, ``(joints,)`` [rad or m]:
     #: repeatability plus what the model leaves. Zero where none was found.
     joint_error: Array
     joint_freedom: Array  #: Degrees of freedom behind its square, ``(joints,)``; infinite where none was found.
-    #: Whether the covariance follows from the scatter of the arrivals: for losses other than the linear one, and where
-    #: errors of the joints do not explain how the residuals of an arrival hang together.
+    #: Whether the covariance follows from the scatter of the visits: for losses other than the linear one, and where
+    #: errors of the joints do not explain how the residuals of a visit hang together.
     scattered: bool
     #: What the loss left of each reading, ``(readings,)``, in the order of the dataset; NaN where none was used. For
     #: sums of absolute values, which have no full weight, relative to the median reading.
@@ -275,7 +275,7 @@ def identify(
 def place(robot: Robot, data: Dataset, loss: Loss = "linear", held: Held = NOTHING_HELD) -> Robot:
     """Return the uncalibrated robot in the frames of the data: only base, targets and fixtures are fitted.
 
-    Readings are weighed one by one. What an uncalibrated robot leaves is no error of the joints at an arrival.
+    Readings are weighed one by one. What an uncalibrated robot leaves is no error of the joints at a visit.
     """
     if held:
         start = start_from_readings(FRAMES.prepared(robot), data, held)
@@ -377,7 +377,7 @@ def _worth(
     else:
         covariance, parts = cluster_covariance(
             lambda: _pulled(problem, solution, loss, solved.curves.design_effect),
-            Arrivals(problem.arrivals),
+            Visits(problem.visits),
             ~at_bound,
             _beforehand(problem, limits, open_),
         )

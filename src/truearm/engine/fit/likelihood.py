@@ -1,4 +1,4 @@
-"""The restricted likelihood of variances, with its slopes, from products of few numbers by arrival.
+"""The restricted likelihood of variances, with its slopes, from products of few numbers by visit.
 
 See :mod:`truearm.engine.fit.variance_components` for the model.
 """
@@ -18,26 +18,26 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import FreeParameters
 
 
-# What readings of one arrival share: the robot stops once, and every target is read with the same joint errors.
+# What readings of one visit share: the robot stops once, and every target is read with the same joint errors.
 #
-# With errors of the joints of variance S, the residuals of an arrival, each divided by its own deviation, have the
+# With errors of the joints of variance S, the residuals of a visit, each divided by its own deviation, have the
 # covariance ``V = I + G S G'``, where G is their derivative by the joints. Multiplied by ``V^-1/2`` they are
 # independent again. With ``H = G S^1/2`` that is ``I - H f(H'H) H'`` for a function f of a small matrix, so no matrix
 # of all rows is ever formed.
 @dataclass(frozen=True, eq=False)
-class Arrivals:
-    """Equations gathered by arrival."""
+class Visits:
+    """Equations gathered by visit."""
 
-    of_row: NDArray[np.intp]  #: Index of the arrival of each equation, ``(rows,)``, without gaps.
+    of_row: NDArray[np.intp]  #: Index of the visit of each equation, ``(rows,)``, without gaps.
 
     @property
     def count(self) -> int:
-        """Number of arrivals."""
+        """Number of visits."""
         return int(self.of_row.max(initial=-1)) + 1
 
     @cached_property
     def alike(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], ...]:
-        """Arrivals with equally many equations: their indices ``(k,)`` and the places of their equations ``(k, m)``."""
+        """Visits with equally many equations: their indices ``(k,)`` and the places of their equations ``(k, m)``."""
         sizes = np.bincount(self.of_row)
         order = np.argsort(self.of_row, kind="stable")
         first = np.cumsum(sizes) - sizes
@@ -47,21 +47,21 @@ class Arrivals:
             if len(mine := np.flatnonzero(sizes == size))
         )
 
-    def of(self, rows: Rows) -> Arrivals:
-        """Return the arrivals of some equations: all those of some arrivals."""
+    def of(self, rows: Rows) -> Visits:
+        """Return the visits of some equations: all those of some visits."""
         if isinstance(rows, slice):
             return self
-        return Arrivals(np.unique(self.of_row[rows], return_inverse=True)[1].reshape(-1))
+        return Visits(np.unique(self.of_row[rows], return_inverse=True)[1].reshape(-1))
 
     def products(self, left: Array, right: Array) -> Array:
-        """Return ``left' right`` of each arrival, ``(arrivals, a, b)``, for ``(rows, a)`` and ``(rows, b)``."""
+        """Return ``left' right`` of each visit, ``(visits, a, b)``, for ``(rows, a)`` and ``(rows, b)``."""
         found = np.empty((self.count, left.shape[1], right.shape[1]))
         for mine, rows in self.alike:
             found[mine] = np.swapaxes(left[rows], 1, 2) @ right[rows]
         return found
 
     def spread(self, left: Array, right: Array) -> Array:
-        """Return ``left right`` of each arrival, ``(rows, b)``, for ``(rows, a)`` and ``(arrivals, a, b)``."""
+        """Return ``left right`` of each visit, ``(rows, b)``, for ``(rows, a)`` and ``(visits, a, b)``."""
         found = np.empty((len(left), right.shape[2]))
         for mine, rows in self.alike:
             found[rows] = left[rows] @ right[mine]
@@ -70,21 +70,21 @@ class Arrivals:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Makes the residuals of an arrival independent."""
+    """Makes the residuals of a visit independent."""
 
-    arrivals: Arrivals  #: Which equations hang together.
+    visits: Visits  #: Which equations hang together.
     shared: Array  #: Derivative of the equations by the joints, times the deviations of these, ``(rows, joints)``.
 
     def of(self, rows: Rows) -> Whitening:
-        """Return it for some equations: all those of some arrivals."""
+        """Return it for some equations: all those of some visits."""
         if isinstance(rows, slice):
             return self
-        return Whitening(self.arrivals.of(rows), self.shared[rows])
+        return Whitening(self.visits.of(rows), self.shared[rows])
 
     @cached_property
     def _inner(self) -> tuple[Array, Array]:
-        """Eigenvalues ``(arrivals, joints)`` and eigenvectors of ``shared' shared`` of each arrival."""
-        values, vectors = np.linalg.eigh(self.arrivals.products(self.shared, self.shared))
+        """Eigenvalues ``(visits, joints)`` and eigenvectors of ``shared' shared`` of each visit."""
+        values, vectors = np.linalg.eigh(self.visits.products(self.shared, self.shared))
         return np.maximum(values, 0.0), vectors
 
     def applied(self, rows: Array) -> Array:
@@ -100,8 +100,8 @@ class Whitening:
         flat = rows.reshape(len(rows), -1)
         vectors = self._inner[1]
         inner = (vectors * factor[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-        product = inner @ self.arrivals.products(self.shared, flat)
-        return np.asarray(rows + self.arrivals.spread(self.shared, product).reshape(rows.shape))
+        product = inner @ self.visits.products(self.shared, flat)
+        return np.asarray(rows + self.visits.spread(self.shared, product).reshape(rows.shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +167,7 @@ class WhitenedEvaluation:
         return self.problem.whitening.applied(self.plain.jacobian)
 
 
-#: Products of parameters and joints that are kept for all arrivals, and that are gone through at once.
+#: Products of parameters and joints that are kept for all visits, and that are gone through at once.
 _KEPT: Final = 16_000_000
 _AT_ONCE: Final = 2_000_000
 
@@ -184,13 +184,13 @@ class Linearised:
     """A fit linearised at its solution."""
 
     residual: Array  #: Divided by the deviations assumed so far, ``(rows,)``.
-    #: Its derivative, per prior, ``(rows, parameters)``; or what goes through it, the equations of some whole arrivals
+    #: Its derivative, per prior, ``(rows, parameters)``; or what goes through it, the equations of some whole visits
     #: at a time, each with their indices.
     by_parameters: Array | Callable[[], Iterable[tuple[Rows, Array]]]
     by_joints: Array  #: Its derivative by the errors of the joints, ``(rows, joints)``.
     offset: Array  #: How far the parameters are from the centres of their priors, in priors, ``(parameters,)``.
     priors: bool  #: Whether they have any.
-    arrivals: Arrivals  #: Which equations share a draw of the joints' errors.
+    visits: Visits  #: Which equations share a draw of the joints' errors.
     #: Index of the factor by which the variance of each equation may differ from the one assumed, ``(rows,)``.
     factor: NDArray[np.intp]
     #: Of the derivative by the parameters, ``(k, parameters)``, where it is known: products of its columns are those of
@@ -236,15 +236,15 @@ class Linearised:
 
 
 class Moments:
-    """Products of the equations by arrival and factor: all that the likelihood needs of them."""
+    """Products of the equations by visit and factor: all that the likelihood needs of them."""
 
     def __init__(self, at: Linearised, factors: int) -> None:
         self.at = at
         joints, p = at.by_joints.shape[1], at.directions.shape[1]
         self.known = at.directions.T @ at.directions if at.priors else np.zeros((p, p))
         self.rows = np.bincount(at.factor, minlength=factors).astype(float)
-        self.M = np.empty((factors, at.arrivals.count, joints, joints))
-        self.t = np.empty((factors, at.arrivals.count, joints))
+        self.M = np.empty((factors, at.visits.count, joints, joints))
+        self.t = np.empty((factors, at.visits.count, joints))
         self.C, self.c, self.q = np.zeros((factors, p, p)), np.zeros((factors, p)), np.zeros(factors)
         kept: list[tuple[NDArray[np.intp], Array]] = []
         fits = self.t.size * p <= _KEPT
@@ -256,26 +256,26 @@ class Moments:
                 self.C[index] += square[:-1, :-1]
                 self.c[index] += square[:-1, -1]
                 self.q[index] += square[-1, -1]
-            here, products = self._by_arrival(rows, np.column_stack([at.by_joints[rows], whole]))
+            here, products = self._by_visit(rows, np.column_stack([at.by_joints[rows], whole]))
             self.M[:, here], self.t[:, here] = products[..., :joints], products[..., -1]
             if fits:
                 kept.append((here, np.ascontiguousarray(products[..., joints:-1])))
         self._kept = kept if fits else None
 
-    def _by_arrival(self, rows: Rows, every: Array) -> tuple[NDArray[np.intp], Array]:
-        """Return arrivals, and products of their equations with the derivatives by the joints, by factor."""
+    def _by_visit(self, rows: Rows, every: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return visits, and products of their equations with the derivatives by the joints, by factor."""
         at, joints = self.at, self.at.by_joints.shape[1]
-        arrivals, factor, factors = at.arrivals.of(rows), at.factor[rows], len(self.q)
-        products = np.empty((factors, arrivals.count, joints, every.shape[1]))
+        visits, factor, factors = at.visits.of(rows), at.factor[rows], len(self.q)
+        products = np.empty((factors, visits.count, joints, every.shape[1]))
         for index in range(factors):
             mine = every if factors == 1 else np.where((factor == index)[:, None], every, 0.0)
-            products[index] = arrivals.products(mine[:, :joints], mine)
-        return np.unique(at.arrivals.of_row[rows]), products
+            products[index] = visits.products(mine[:, :joints], mine)
+        return np.unique(at.visits.of_row[rows]), products
 
     def parts(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
         """Go through the products with the derivatives by the parameters, ``(factors, k, joints, parameters)``.
 
-        Each part comes with the indices of its arrivals. Where there are too many to be kept they are found anew.
+        Each part comes with the indices of its visits. Where there are too many to be kept they are found anew.
         """
         most = max(1, _AT_ONCE // max(1, self.t.shape[2] * len(self.known)))
         joints = self.at.by_joints.shape[1]
@@ -283,7 +283,7 @@ class Moments:
         if found is None:
             by_joints = self.at.by_joints
             for rows, Q, _ in self.at.turned():
-                here, products = self._by_arrival(rows, np.column_stack([by_joints[rows], Q]))
+                here, products = self._by_visit(rows, np.column_stack([by_joints[rows], Q]))
                 yield here, products[..., joints:]
             return
         for here, T in found:
@@ -331,7 +331,7 @@ class Likelihood:
         self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.abs(np.diag(self.L))).sum()) + left)
 
     def _parts(self, *, always: bool = False) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
-        """Go through the arrivals: indices, products with the parameters by factor, and these by their variances.
+        """Go through the visits: indices, products with the parameters by factor, and these by their variances.
 
         There is nothing to go through where no joint has a variance, unless it is asked for.
         """
@@ -347,7 +347,7 @@ class Likelihood:
 
     @cached_property
     def _seen(self) -> Array:
-        """What the parameters explain of the products of each arrival, ``(factors, arrivals, joints)``."""
+        """What the parameters explain of the products of each visit, ``(factors, visits, joints)``."""
         seen = np.empty_like(self.of.t)
         for mine, by_factor in self.of.parts():
             seen[:, mine] = (by_factor.reshape(-1, len(self.found)) @ self.found).reshape(by_factor.shape[:-1])
@@ -440,11 +440,11 @@ class Likelihood:
 
 
 def _product(left: Array, right: Array) -> Array:
-    """Return the sum over arrivals and joints of products of parameters, for two ``(arrivals, joints, p)``."""
+    """Return the sum over visits and joints of products of parameters, for two ``(visits, joints, p)``."""
     p = left.shape[-1]
     return left.reshape(-1, p).T @ right.reshape(-1, p)
 
 
 def _moved(products: Array, by: Array) -> Array:
-    """Return the sum over arrivals and joints of ``(arrivals, joints, p)`` times ``(arrivals, joints)``, ``(p,)``."""
+    """Return the sum over visits and joints of ``(visits, joints, p)`` times ``(visits, joints)``, ``(p,)``."""
     return products.reshape(-1, products.shape[-1]).T @ by.reshape(-1)

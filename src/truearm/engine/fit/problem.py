@@ -118,10 +118,10 @@ class Problem:
         return sum(block.rows for block in self.blocks)
 
     @cached_property
-    def arrivals(self) -> NDArray[np.intp]:
-        """Index of the arrival that each equation belongs to, ``(rows,)``.
+    def visits(self) -> NDArray[np.intp]:
+        """Index of the visit that each equation belongs to, ``(rows,)``.
 
-        Readings of one configuration, and of one visit of it where visits are told apart, are of one arrival. What is
+        Readings of one configuration are of one visit, unless the data tell its visits apart. What is
         known of a fixture is of none, and stands alone.
         """
         data = self.data

@@ -18,7 +18,7 @@ from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.fit.bounds import Bounds, bound_vectors
 from truearm.engine.fit.curves import NO_CURVES, Curves, with_stiffness
 from truearm.engine.fit.held import NOTHING_HELD, Held
-from truearm.engine.fit.likelihood import Arrivals, Linearised, WhitenedProblem, Whitening
+from truearm.engine.fit.likelihood import Linearised, Visits, WhitenedProblem, Whitening
 from truearm.engine.fit.losses import Loss, norms_of, scale_of, weighed_together
 from truearm.engine.fit.models import Model
 from truearm.engine.fit.problem import (
@@ -104,7 +104,7 @@ def find_parameters(
     It is what :func:`truearm.engine.fit.fit.identify` does first, with the same parameters and refusals.
 
     Args:
-        shared: Whether errors of the joints that the readings of an arrival share are looked for, with the linear loss.
+        shared: Whether errors of the joints that the readings of a visit share are looked for, with the linear loss.
         near: A solution of the same robot and model from other data: the search begins at its frames, values and
             variances. What is found does not depend on it.
     """
@@ -273,7 +273,7 @@ def _solve_with_noise(
     """Solve; then again with what the solution says of deviations, of the joints' curves and of the loads.
 
     Deviations are estimated where they are not declared. Declared ones are widened where the residuals are larger than
-    they, and errors of the joints that an arrival's readings share, allow: believed to the letter, readings that the
+    they, and errors of the joints that a visit's readings share, allow: believed to the letter, readings that the
     model cannot follow would overrule every prior, for the sake of directions that they hardly observe. Curves of the
     joints join in when the first solution has told how stiff they are. Where the readings turn out not to tell a
     deviation, all is solved once more with it as it was declared, or assumed.
@@ -372,7 +372,7 @@ def solve_with_joints(
         taken = replace(problem, noise=noise, widened=problem.widened * root)
     if joints.any():
         shared = taken.at(taken.free.start).by_joints * np.sqrt(joints * design_effect)
-        solution = solve(WhitenedProblem(taken, Whitening(Arrivals(taken.arrivals), shared)), loss, limits, small)
+        solution = solve(WhitenedProblem(taken, Whitening(Visits(taken.visits), shared)), loss, limits, small)
     else:
         solution = solve(taken, loss, limits, small)
     return replace(solution, at=problem.at(solution.vector)) if joints.any() or root != 1.0 else solution
@@ -407,7 +407,7 @@ def components_found(
         by_joints=here.by_joints,
         offset=((solution.vector - problem.free.nominal) / prior)[uncertain],
         priors=problem.priors,
-        arrivals=Arrivals(problem.arrivals),
+        visits=Visits(problem.visits),
         factor=of_row,
         triangle=here.triangle[:, uncertain] * prior[uncertain],
     )

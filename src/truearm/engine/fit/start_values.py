@@ -135,7 +135,7 @@ _SEARCH_SMALL: Final = 1e-2
 _READINGS_USED: Final = 120
 #: How many of one fixture, at least.
 _LEAST_OF_A_FIXTURE: Final = 12
-#: So alike a fixture's name that was read a few times must be to another for a slip of the pen.
+#: So alike a fixture's name that was read a few times must be to another for a misspelling.
 _ALIKE: Final = 0.8
 #: Singular values below this share of the largest belong to unknowns that are not determined.
 _LEAST_SINGULAR_VALUE: Final = 1e-5

@@ -10,18 +10,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.fit.likelihood import Arrivals, Likelihood, Linearised, Moments, Whitening
+from truearm.engine.fit.likelihood import Likelihood, Linearised, Moments, Visits, Whitening
 from truearm.engine.fit.problem import Rows
 from truearm.engine.robot.chain import Array
 
 # How large the noise of the readings and the error of the joints are, by restricted maximum likelihood.
 #
 # The residuals of a linearised fit are ``z = A u + G e + n``: parameters u with their Gaussian priors, errors e of the
-# joints that all readings of an arrival share, and noise n of the readings. With ``V = D + G S G'``, the parameters
+# joints that all readings of a visit share, and noise n of the readings. With ``V = D + G S G'``, the parameters
 # integrated out, ``z`` is normal with the precision ``P = V^-1 - V^-1 A (A' V^-1 A + K)^-1 A' V^-1``, K the information
 # of the priors. That is the restricted likelihood of Patterson and Thompson (1971) where priors are wide. Its maximum
 # is found by Newton steps in the logarithms of the variances, with the average of the observed and the expected
-# information (Gilmour, Thompson and Cullis 1995). All it needs of the readings are products of few numbers by arrival,
+# information (Gilmour, Thompson and Cullis 1995). All it needs of the readings are products of few numbers by visit,
 # formed once.
 
 #: Twice the gain in log-likelihood from which joint errors are believed.
@@ -46,7 +46,7 @@ class Variances:
     """Variances of readings and of joints."""
 
     factors: Array  #: What the variance of the equations of each factor is, by the variance assumed, ``(factors,)``.
-    #: Variance of the error of each joint that the readings of an arrival share [rad^2 or m^2], ``(joints,)``.
+    #: Variance of the error of each joint that the readings of a visit share [rad^2 or m^2], ``(joints,)``.
     joints: Array
     #: Degrees of freedom behind the variance of each joint (Satterthwaite 1946), ``(joints,)``; infinite where there is
     #: none.
@@ -78,7 +78,7 @@ class Components:
     """Variances, and what the parameters are worth with them."""
 
     likeliest: Variances  #: The variances with the largest likelihood.
-    #: Those that readings are to be weighed by: the same where errors of the joints explain how residuals of an arrival
+    #: Those that readings are to be weighed by: the same where errors of the joints explain how residuals of a visit
     #: hang together, else the likeliest ones without errors of the joints.
     weighing: Variances
     estimated: tuple[bool, ...]  #: Whether the variance of each factor was.
@@ -285,21 +285,21 @@ def _agree(alone: Likelihood, best: Likelihood) -> bool:
 
 
 def _independent(state: Likelihood) -> bool:
-    """Return whether the pulls of arrivals on the parameters are no larger than those of independent ones.
+    """Return whether the pulls of visits on the parameters are no larger than those of independent ones.
 
-    The sum of their squares, in deviations of the parameters, is what an estimate from the scatter of the arrivals
+    The sum of their squares, in deviations of the parameters, is what an estimate from the scatter of the visits
     finds of the parameters' variance, by what the variances say (the idea of White 1982).
     """
     at = state.of.at
     root = np.sqrt(state.factors)[at.factor]
-    whitening = Whitening(at.arrivals, at.by_joints * np.sqrt(state.joints) / root[:, None])
+    whitening = Whitening(at.visits, at.by_joints * np.sqrt(state.joints) / root[:, None])
     expected = variance = squares = 0.0
     for rows, Q, z in at.turned():
         part = whitening.of(rows)
         X = np.asarray(np.linalg.solve(state.L, part.applied(Q / root[rows, None]).T).T, dtype=np.float64)
-        pulls = part.arrivals.products(X, part.applied((z - Q @ state.found) / root[rows])[:, None])
+        pulls = part.visits.products(X, part.applied((z - Q @ state.found) / root[rows])[:, None])
         squares += float(np.sum(pulls**2))
-        for _, alike in part.arrivals.alike:
+        for _, alike in part.visits.alike:
             few = X[alike]
             few = few if few.shape[1] > few.shape[2] else np.swapaxes(few, 1, 2)
             gram = np.swapaxes(few, 1, 2) @ few
@@ -403,35 +403,35 @@ def widening(freedom: float) -> float:
     return float(stdtrit(freedom, 0.975)) / 1.959963984540054
 
 
-#: Share that an arrival may have in what is known of a direction, for its pull to be made up for.
+#: Share that a visit may have in what is known of a direction, for its pull to be made up for.
 _LARGEST_SHARE: Final = 0.999
 #: Share of the prior variance that the data should remove for a parameter to count in the degrees of freedom.
 _INFORMED: Final = 0.5
 _LEAST_FREEDOM: Final = 1.0
-#: Numbers that are in memory at once, of the arrivals' shares and of their products.
+#: Numbers that are in memory at once, of the visits' shares and of their products.
 _KEPT: Final = 16_000_000
 
 
-# What parameters are uncertain by where no model of the residuals holds: from the scatter of the arrivals themselves.
+# What parameters are uncertain by where no model of the residuals holds: from the scatter of the visits themselves.
 #
-# The parameters answer to the sum of the arrivals' pulls, so the variance of that sum, found from the pulls, gives
+# The parameters answer to the sum of the visits' pulls, so the variance of that sum, found from the pulls, gives
 # theirs (Huber 1967; Liang and Zeger 1986): ``H^-1 (M + K) H^-1`` with H the information, K that of the priors, and M
-# the sum of the squared pulls. A fit has followed each arrival part of the way; the pulls are those of Bell and
-# McCaffrey (2002, their second estimator), which are right on average where arrivals are alike and independent, and an
+# the sum of the squared pulls. A fit has followed each visit part of the way; the pulls are those of Bell and
+# McCaffrey (2002, their second estimator), which are right on average where visits are alike and independent, and an
 # interval has their degrees of freedom (Pustejovsky and Tipton 2018). With priors all of that holds as it stands, if
 # truths come from them.
 def cluster_covariance(
     parts: Callable[[], Iterable[tuple[Rows, Array, Array]]],
-    arrivals: Arrivals,
+    visits: Visits,
     uncertain: NDArray[np.bool_],
     beforehand: Array,
 ) -> tuple[Array, tuple[CovariancePart, ...]]:
     """Return the covariance of parameters scaled by their priors, zero for those that are not uncertain.
 
-    With it come its parts: of the arrivals' scatter, without what that is uncertain by, and of the priors.
+    With it come its parts: of the visits' scatter, without what that is uncertain by, and of the priors.
 
     Args:
-        parts: Goes through the equations of some whole arrivals at a time, each part with their indices, with the
+        parts: Goes through the equations of some whole visits at a time, each part with their indices, with the
             square root of the information: a Jacobian, per prior, whose square is what the parameters are known by,
             ``(k, parameters)``; and with what each equation pulls the parameters with, ``(k, parameters)``: its
             residual times its weight times its derivative, per prior.
@@ -445,7 +445,7 @@ def cluster_covariance(
     _, s, Vt = np.linalg.svd(triangle, full_matrices=False)
     directions = Vt.T / np.maximum(s, 1e-12 * s[:1])
     along = root @ directions
-    meat, freedom = _meat(_Scatter(parts, arrivals, uncertain, directions), bool(root.any()))
+    meat, freedom = _meat(_Scatter(parts, visits, uncertain, directions), bool(root.any()))
     known = along.T @ along
     whole = CovariancePart(directions @ (widening(freedom) ** 2 * meat + known) @ directions.T, np.inf)
     scatter = CovariancePart(directions @ meat @ directions.T, freedom)
@@ -455,15 +455,15 @@ def cluster_covariance(
 
 @dataclass(frozen=True, eq=False)
 class _Scatter:
-    """Arrivals with their equations and pulls for :func:`cluster_covariance`, and directions to see them in."""
+    """Visits with their equations and pulls for :func:`cluster_covariance`, and directions to see them in."""
 
     parts: Callable[[], Iterable[tuple[Rows, Array, Array]]]
-    arrivals: Arrivals
+    visits: Visits
     uncertain: NDArray[np.bool_]
     directions: Array  #: Of unit information, ``(parameters, p)``.
 
     def alike(self) -> Iterable[tuple[Array, Array, Array]]:
-        """Go through arrivals with equally many equations, all at once where that takes little memory.
+        """Go through visits with equally many equations, all at once where that takes little memory.
 
         Each comes with its share of what is known: eigenvalues ``(k, m)``, their vectors ``(k, p, m)``, and its pull
         ``(k, p)``.
@@ -472,16 +472,16 @@ class _Scatter:
 
     @cached_property
     def _kept(self) -> list[tuple[Array, Array, Array]] | None:
-        few = len(self.arrivals.of_row) * self.directions.shape[1] <= _KEPT
+        few = len(self.visits.of_row) * self.directions.shape[1] <= _KEPT
         return list(self._found()) if few else None
 
     def _found(self) -> Iterator[tuple[Array, Array, Array]]:
         for rows, told, pull in self.parts():
-            arrivals = self.arrivals.of(rows)
+            visits = self.visits.of(rows)
             X = told[:, self.uncertain] @ self.directions
             pulled = pull[:, self.uncertain] @ self.directions
-            pulls = arrivals.products(pulled, np.ones((len(pull), 1)))[..., 0]
-            for mine, places in arrivals.alike:
+            pulls = visits.products(pulled, np.ones((len(pull), 1)))[..., 0]
+            for mine, places in visits.alike:
                 yield *_eigen(X[places]), pulls[mine]
 
 
@@ -506,7 +506,7 @@ def _meat(scatter: _Scatter, known_before: bool) -> tuple[Array, float]:
         informed = informed if informed.any() else ~informed
     asked = directions[informed]
     meat = np.zeros((count, count))
-    # Of each parameter, over the arrivals: variance of its shares, their squares, what they have in common.
+    # Of each parameter, over the visits: variance of its shares, their squares, what they have in common.
     total, squares, mixed, spent = np.zeros((4, len(asked)))
     crossed = np.empty(len(asked))
     at_once = max(1, _KEPT // count**2)

@@ -1,7 +1,7 @@
 """How far the real robot is expected to miss the targets of programs, before their correction and after it.
 
 A calibrated model is itself uncertain: by the covariance of its parameters, and by the error of the joints at each
-arrival. With the predicted correction ``d`` of a target, and the error ``e`` of that prediction, the robot misses by
+visit. With the predicted correction ``d`` of a target, and the error ``e`` of that prediction, the robot misses by
 ``d + e`` before and by ``e`` after. It gets worse if ``|e| > |d + e|``, that is if ``e`` reaches beyond half of ``-d``,
 with the probability ``Phi(-|d| / (2 s))`` where ``s`` is the deviation of ``e`` along ``d``.
 
@@ -36,7 +36,7 @@ _AT_ONCE: Final = 2000
 #: Targets and draws from which the interval of the mean error follows.
 _DRAWN_TARGETS: Final = 500
 _DRAWS: Final = 400
-#: Share of the joints' error at an arrival that all targets of a program have in common: what the model leaves changes
+#: Share of the joints' error at a visit that all targets of a program have in common: what the model leaves changes
 #: slowly from place to place, repeatability does not.
 _IN_COMMON: Final = 0.5
 #: Degrees of freedom of Student's distribution that the errors have at one place: how well variances are known, and how
@@ -176,10 +176,10 @@ def _expected(model: _ModelErrors, targets: TargetsReached) -> ExpectedErrors:
     for part, errors, by_joints in model.errors(targets):
         d = shift[part]
         by_model = np.einsum("nip,ni->np", errors, d)
-        by_arrival = np.einsum("nij,ni->nj", by_joints, d)
+        by_visit = np.einsum("nij,ni->nj", by_joints, d)
         np.add.at(together, targets.groups[part], by_model)
-        np.add.at(alone, targets.groups[part], np.sum(by_arrival**2, axis=1))
-        along[part] = np.sum(by_model**2, axis=1) + np.sum(by_arrival**2, axis=1)
+        np.add.at(alone, targets.groups[part], np.sum(by_visit**2, axis=1))
+        along[part] = np.sum(by_model**2, axis=1) + np.sum(by_visit**2, axis=1)
         covariance = errors @ errors.swapaxes(1, 2) + by_joints @ by_joints.swapaxes(1, 2)
         mean2[part] = np.trace(covariance, axis1=1, axis2=2)
         spread2[part] = np.sum(covariance**2, axis=(1, 2))
@@ -325,7 +325,7 @@ class _ModelErrors:
         return np.asarray(rates[nearest]), np.asarray(nearest < len(robot.targets))[:, None, None]
 
     def _by_joints(self, robot: Robot, q: Array, tip: Array) -> Array:
-        """Return the errors of tips by the errors of the joints at an arrival, ``(m, 3, joints)``."""
+        """Return the errors of tips by the errors of the joints at a visit, ``(m, 3, joints)``."""
         deviations = np.asarray(self.proof.joint_error)
         if not deviations.any():
             return np.zeros((len(q), 3, 1))

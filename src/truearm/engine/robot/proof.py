@@ -39,7 +39,7 @@ class Proof:
     errors: tuple[Notice, ...]  #: Notices of the level error.
     #: Lowest and highest position of each joint at which it was measured [rad or m].
     region: tuple[tuple[float, float], ...]
-    #: Standard deviation of the error of each joint that readings of an arrival share [rad or m].
+    #: Standard deviation of the error of each joint that readings of a visit share [rad or m].
     joint_error: tuple[float, ...]
     names: tuple[str, ...]  #: The parameters that were identified.
     deviations: tuple[float, ...]  #: Their standard deviations [SI].

@@ -490,7 +490,7 @@ def _refuse_above_rating(robot: Robot, wrench: Wrench) -> None:
 
     weight = robot.rated_load * STANDARD_GRAVITY
     at_reach = weight * reach(robot, None)
-    cure = "Check number and unit. If the maker allows it, mend the entry rated_load of the robot file."
+    cure = "Check number and unit. If the maker allows it, fix the entry rated_load of the robot file."
     for what, came, most, unit in (
         ("force", math.hypot(*wrench.force), weight, "N"),
         ("moment", math.hypot(*wrench.moment), at_reach, "N m"),

@@ -154,7 +154,7 @@ def _check(plan: PerformancePlan, pushes: Pushes, directions: tuple[str, ...]) -
         )
 
 
-#: A push is wild that lies so many deviations off its line, and so many times as far as any other that is left.
+#: A push is outlying that lies so many deviations off its line, and so many times as far as any other that is left.
 _FAR: Final = 8.0
 _BEYOND: Final = 2.2
 #: The scatter is never taken below this share of the instrument's.
@@ -164,7 +164,7 @@ _LEAST_FORCES: Final = 4
 
 
 @dataclass(frozen=True)
-class WildPush:
+class OutlyingPush:
     """A push that lies far from the line of the others."""
 
     direction: str  #: direction, cycle, line: which; the line of the file.
@@ -176,7 +176,7 @@ class WildPush:
     without: float
 
 
-def wild_pushes(lines: Sequence[PushLine], instrument: Instrument) -> tuple[WildPush, ...]:
+def outlying_pushes(lines: Sequence[PushLine], instrument: Instrument) -> tuple[OutlyingPush, ...]:
     """Return pushes that are further off their line than all others by more than scatter does, one a line."""
     lines = [one for one in lines if len(one.force) >= _LEAST_FORCES]
     if not lines:
@@ -184,16 +184,16 @@ def wild_pushes(lines: Sequence[PushLine], instrument: Instrument) -> tuple[Wild
     off = [_off(one.force, one.displacement) for one in lines]
     scatter = max(1.4826 * float(np.median(np.concatenate(off))), instrument.least_scatter(_LEAST_SCATTER)[0], 1e-12)
     order = np.argsort([-one.max() for one in off], kind="stable")
-    wild = 0
+    outlying = 0
     for k in range(1, max(1, len(lines) // 3) + 1):
         chosen = order[:k]
         left = [float(off[one].max()) for one in order[k:]]
         left += [float(_off(*_without(lines[one], int(off[one].argmax()))).max()) for one in chosen]
         if off[chosen[-1]].max() > max(_FAR * scatter, _BEYOND * max(left)):
-            wild = k
+            outlying = k
     slopes = {one.direction: [other.slope for other in lines if other.direction == one.direction] for one in lines}
     found = []
-    for number in sorted(order[:wild]):
+    for number in sorted(order[:outlying]):
         one, row = lines[number], int(off[number].argmax())
         force, moved = _without(one, row)
         slope, rest = np.polyfit(force, moved, 1)
@@ -202,7 +202,7 @@ def wild_pushes(lines: Sequence[PushLine], instrument: Instrument) -> tuple[Wild
         away = float(abs(one.displacement[row] - rest - slope * one.force[row]))
         without = value + (float(slope) - one.slope) / len(mine)
         line = int(one.line[row])
-        found.append(WildPush(one.direction, one.cycle, line, float(one.force[row]), away, value, without))
+        found.append(OutlyingPush(one.direction, one.cycle, line, float(one.force[row]), away, value, without))
     return tuple(found)
 
 

@@ -29,8 +29,9 @@ STATIONS = 50
 _HALF = 0.5
 #: Between two samples at most so many stations may lie: deviations that change faster are not seen.
 _SPARSE = 2.0
-#: A cycle so many times as far from the middle of all as every other one is wild; so many times of fewer than so many.
-_WILD, _WILD_OF_FEW, _FEW = 4.0, 12.0, 8
+#: A cycle so many times as far from the middle of all as every other one is outlying; so many times of fewer than so
+#: many.
+_OUTLYING, _OUTLYING_OF_FEW, _FEW = 4.0, 12.0, 8
 #: Simulated campaigns for an interval, and normal numbers for the mean and spread of distances.
 _TRIALS, _DRAWS = 400, 500
 _ANGLES: tuple[Component, ...] = ("a", "b", "c")
@@ -141,7 +142,7 @@ def deviations_of(run: Run, stations: int = STATIONS) -> PathDeviations:
     )
 
 
-def wild_cycle(here: PathDeviations) -> tuple[int, float, float, float] | None:
+def outlying_cycle(here: PathDeviations) -> tuple[int, float, float, float] | None:
     """Return a cycle that is elsewhere as a whole: which, how far [m], and AT and RT without it; None if none is.
 
     It is four times as far from the middle of the cycles as every other one, root mean square over the stations; of
@@ -154,7 +155,7 @@ def wild_cycle(here: PathDeviations) -> tuple[int, float, float, float] | None:
     far = np.sqrt((away**2).sum(axis=2).mean(axis=1))
     order = np.argsort(far)
     worst = int(order[-1])
-    if far[worst] <= (_WILD if n >= _FEW else _WILD_OF_FEW) * far[order[-2]]:
+    if far[worst] <= (_OUTLYING if n >= _FEW else _OUTLYING_OF_FEW) * far[order[-2]]:
         return None
     rest = np.delete(here.deviation, worst, axis=0)
     return (

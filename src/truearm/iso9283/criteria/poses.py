@@ -32,6 +32,7 @@ from truearm.iso9283.criteria.intervals import (
     repeatability_interval,
     spread_interval,
 )
+from truearm.iso9283.criteria.outlying_rows import OutlyingRow, UnusualRows, unusual_rows, without
 from truearm.iso9283.criteria.rows import (
     ANGLES,
     AXES,
@@ -43,7 +44,6 @@ from truearm.iso9283.criteria.rows import (
     cycles_of,
     valued,
 )
-from truearm.iso9283.criteria.wild_rows import UnusualRows, WildRow, unusual_rows, without
 from truearm.iso9283.planning.criteria import TEST_OF, TESTS, PerformancePlan, PlannedTest
 from truearm.iso9283.planning.records import AttainedPoses
 
@@ -190,12 +190,12 @@ def evaluate(
     judge = _Judge(alignment, instrument)
     values, courses = _evaluated(plan.tests, cycles, judge)
     unusual = unusual_rows(cycles, instrument)
-    if unusual.wild:
-        tests = {one.of.test for one in unusual.wild}
-        left = without(cycles, unusual.wild)
+    if unusual.outlying:
+        tests = {one.of.test for one in unusual.outlying}
+        left = without(cycles, unusual.outlying)
         others, _ = _evaluated([test for test in plan.tests if test.id in tests], left, judge)
         unusual = replace(
-            unusual, wild=tuple(replace(one, changes=_changes(one, values, others)) for one in unusual.wild)
+            unusual, outlying=tuple(replace(one, changes=_changes(one, values, others)) for one in unusual.outlying)
         )
     clouds = tuple(_cloud(cycle) for cycle in cycles if cycle.test != "dAP")
     return PoseEvaluation(tuple(values), clouds, tuple(courses), unusual, missing_rows(plan, cycles))
@@ -217,7 +217,7 @@ def _evaluated(
     return values, courses
 
 
-def _changes(row: WildRow, values: Sequence[Value], others: Sequence[Value]) -> tuple[tuple[Value, Value], ...]:
+def _changes(row: OutlyingRow, values: Sequence[Value], others: Sequence[Value]) -> tuple[tuple[Value, Value], ...]:
     """Return the values that a row is in, each with the same without it."""
     of = row.of
     under = Conditions(of.velocity, of.load, "" if of.test == "E" else of.robot)

@@ -31,9 +31,10 @@ from truearm.iso9283.planning.records import Samples
 _IMPOSSIBLE = ((500.0, 3.0), (100.0, 5.0), (50.0, 20.0))
 #: No tip is faster [m/s].
 _FASTEST = 20.0
-#: So many standard deviations of noise are no wild sample.
+#: So many standard deviations of noise are no outlying sample.
 _NOISE = 14.0
-#: So many samples in a row may be wild and the tip be back where it was; and so many steps tell how fast it goes there.
+#: So many samples in a row may be outlying and the tip be back where it was; and so many steps tell how fast it goes
+#: there.
 _GROUP, _ABOUT = 20, 7
 #: Median length of a vector of three standard normal numbers.
 _MEDIAN = 1.538
@@ -44,7 +45,7 @@ _SINGLE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class WildSteps:
+class OutlyingSteps:
     """Steps from one sample to the next that no tip can take."""
 
     before: NDArray[np.intp]  #: The sample from which each goes, ``(k,)``.
@@ -67,7 +68,7 @@ def scatter_of(position: Array) -> float:
     return float(np.median(np.linalg.norm(np.diff(position, n=3, axis=0), axis=1)) / (_MEDIAN * np.sqrt(20.0)))
 
 
-def wild_steps(time: Array, position: Array, velocity: float | None) -> WildSteps:
+def outlying_steps(time: Array, position: Array, velocity: float | None) -> OutlyingSteps:
     """Return the steps from one sample to the next for which the tip would have to do what no tip can.
 
     A step counts if it differs from what the steps about it say by so much that it takes an acceleration of
@@ -80,7 +81,7 @@ def wild_steps(time: Array, position: Array, velocity: float | None) -> WildStep
             m/s^2.
     """
     if len(time) < 2 * _ABOUT:
-        return WildSteps(np.empty(0, dtype=np.intp), np.empty((0, 3)), max(len(time) - 1, 0))
+        return OutlyingSteps(np.empty(0, dtype=np.intp), np.empty((0, 3)), max(len(time) - 1, 0))
     lasts = np.diff(time)
     lasts = np.maximum(lasts, 0.5 * float(np.median(lasts) or lasts.mean()))
     step = np.diff(position, axis=0)
@@ -100,11 +101,11 @@ def wild_steps(time: Array, position: Array, velocity: float | None) -> WildStep
         least = _FASTEST if velocity is None and row else 0.0
         impossible |= (force > most) & (change > np.maximum(times * usual, least))
     impossible &= jump > noise
-    return WildSteps(likely[impossible], pace[impossible], len(step))
+    return OutlyingSteps(likely[impossible], pace[impossible], len(step))
 
 
-def refuse_wild(
-    samples: Samples, rows: NDArray[np.intp], position: Array, found: WildSteps, cycle: int, clock: Clock
+def refuse_outlying(
+    samples: Samples, rows: NDArray[np.intp], position: Array, found: OutlyingSteps, cycle: int, clock: Clock
 ) -> None:
     """Refuse a record with samples that no tip can have passed, naming them.
 
@@ -129,14 +130,14 @@ def refuse_wild(
             cure="Write the times with more decimals.",
         )
     line, name = samples.line[rows], _name(samples, int(rows[0]), cycle)
-    wild, jumps = _groups(clock.time, position, found)
-    if wild:
-        shown = [_lines(line[first : last + 1].tolist()) for first, last, _ in wild[:_NAMED]]
-        more = f" and {len(wild) - _NAMED} more such places" if len(wild) > _NAMED else ""
+    outlying, jumps = _groups(clock.time, position, found)
+    if outlying:
+        shown = [_lines(line[first : last + 1].tolist()) for first, last, _ in outlying[:_NAMED]]
+        more = f" and {len(outlying) - _NAMED} more such places" if len(outlying) > _NAMED else ""
         raise InputError(
             f"{name} has samples where no tip can have been",
             where=f"{samples.source}, {', '.join(shown)}{more}",
-            came=f"{1e3 * max(off for _, _, off in wild):.4g} mm from the samples about them",
+            came=f"{1e3 * max(off for _, _, off in outlying):.4g} mm from the samples about them",
             allowed="steps that a robot can take from one sample to the next",
             cure="Remove these lines: samples may be missing.",
         )
@@ -152,15 +153,15 @@ def refuse_wild(
 
 
 def _groups(
-    time: Array, position: Array, found: WildSteps
+    time: Array, position: Array, found: OutlyingSteps
 ) -> tuple[list[tuple[int, int, float]], list[tuple[int, float]]]:
-    """Return first, last and distance of wild samples in a row, and samples from which on the record is elsewhere."""
-    wild: list[tuple[int, int, float]] = []
+    """Return first, last and distance of outlying samples in a row, and where the record goes on elsewhere."""
+    outlying: list[tuple[int, int, float]] = []
     jumps: list[tuple[int, float]] = []
     last = -1
     for before, pace in zip(found.before.tolist(), found.pace, strict=True):
         first = before + 1
-        if first <= last + 1 and wild:
+        if first <= last + 1 and outlying:
             continue
         later = np.arange(first, min(first + _GROUP + 1, len(time)))
         expected = position[before] + (time[later] - time[before])[:, None] * pace
@@ -168,13 +169,13 @@ def _groups(
         back = np.flatnonzero(away < 0.5 * away[0])
         if len(back):
             last = first + int(back[0]) - 1
-            wild.append((first, last, float(away[: int(back[0])].max())))
+            outlying.append((first, last, float(away[: int(back[0])].max())))
         elif before == 0 or first == len(time) - 1:
             last = 0 if before == 0 else first
-            wild.append((last, last, float(away[0])))
+            outlying.append((last, last, float(away[0])))
         else:
             jumps.append((first, float(away[0])))
-    return wild, jumps
+    return outlying, jumps
 
 
 def _name(samples: Samples, row: int, cycle: int) -> str:
@@ -299,9 +300,9 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                 )
             position = in_base(transform, samples.position[rows])
             clock = clock_of(samples.time[rows])
-            wild = wild_steps(clock.time, position, velocity)
-            if wild.single:
-                refuse_wild(samples, rows, position, wild, number, clock)
+            outlying = outlying_steps(clock.time, position, velocity)
+            if outlying.single:
+                refuse_outlying(samples, rows, position, outlying, number, clock)
             here = found_in(test, path, clock.time, position, velocity)
             spans = here.cycles
             if number:
@@ -342,5 +343,5 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                         number or count, time, position[first : last + 1], rotation, along, samples.line[chosen], clock
                     )
                 )
-            refuse_wild(samples, rows, position, wild, number, clock)
+            refuse_outlying(samples, rows, position, outlying, number, clock)
         yield Run(test, path, velocity, part.conditions, tuple(cycles), planned.cycles, found)

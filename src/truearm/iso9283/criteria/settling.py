@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.rows import COARSE, Conditions, Instrument, Status, Value
-from truearm.iso9283.criteria.runs import LEAST_SAMPLES, Part, in_base, parts_of, refuse_wild, wild_steps
+from truearm.iso9283.criteria.runs import LEAST_SAMPLES, Part, in_base, outlying_steps, parts_of, refuse_outlying
 from truearm.iso9283.criteria.streams import TOP, Clock, clock_of, local_lines, noise_of, spans_of, top_of
 from truearm.iso9283.planning.criteria import PerformancePlan
 from truearm.iso9283.planning.records import Samples
@@ -138,7 +138,7 @@ def _cycle(
     time = clock.time - clock.time[0]
     position = in_base(transform, samples.position[rows])
     _refuse_other_times(time, position, at)
-    refuse_wild(samples, rows, position, wild_steps(time, position, None), number, clock)
+    refuse_outlying(samples, rows, position, outlying_steps(time, position, None), number, clock)
     band = plan.limit_band
     distance = np.asarray(np.linalg.norm(position - _final(position), axis=1))
     outside = _outside(distance, band, sigma)

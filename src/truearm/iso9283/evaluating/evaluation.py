@@ -13,15 +13,15 @@ from truearm.engine.base.units import Marked
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import homogeneous
 from truearm.iso9283.criteria.alignment import Alignment
-from truearm.iso9283.criteria.compliance import PushLine, WildPush, evaluate_pushes, wild_pushes
+from truearm.iso9283.criteria.compliance import OutlyingPush, PushLine, evaluate_pushes, outlying_pushes
 from truearm.iso9283.criteria.corners import CornerCurves, WeaveCurves, corner_values, weaving_values
 from truearm.iso9283.criteria.drift import DriftCourse
+from truearm.iso9283.criteria.outlying_rows import UnusualRows
 from truearm.iso9283.criteria.paths import PathDeviations, path_values
 from truearm.iso9283.criteria.poses import MissingPlace, PoseCloud, evaluate, missing_places
 from truearm.iso9283.criteria.rows import Conditions, Instrument, Quantity, Value, best_fit_of
 from truearm.iso9283.criteria.settling import SettlingCurve, settling_values
 from truearm.iso9283.criteria.velocity import VelocityCurves, velocity_values
-from truearm.iso9283.criteria.wild_rows import UnusualRows
 from truearm.iso9283.evaluating.doubts import refuse_other_push_place, refuse_other_rests
 from truearm.iso9283.planning.criteria import CRITERIA, TESTS, PerformancePlan
 from truearm.iso9283.planning.records import AttainedPoses, Pushes, Samples
@@ -77,7 +77,7 @@ class Evaluation:
     pushes: tuple[PushLine, ...] = ()
     #: Rows of poses far from the others, and poses with two places of rest.
     unusual: UnusualRows = field(default_factory=UnusualRows)
-    wild_pushes: tuple[WildPush, ...] = ()  #: Pushes far from the line of the others.
+    outlying_pushes: tuple[OutlyingPush, ...] = ()  #: Pushes far from the line of the others.
     missing: tuple[str, ...] = ()  #: Places that have no value in tests that were measured, in words.
     #: The instrument as its readings stand in each file: by the names of :class:`Measurements`.
     readings: Mapping[str, Instrument] = field(default_factory=dict)
@@ -160,7 +160,7 @@ def evaluated(
         refuse_other_push_place(plan, measured.forces, alignment.in_base(measured.forces.position))
         stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, readings["forces"])
         values += stiff
-        made = replace(made, pushes=pushes, wild_pushes=wild_pushes(pushes, readings["forces"]))
+        made = replace(made, pushes=pushes, outlying_pushes=outlying_pushes(pushes, readings["forces"]))
     absent = missing_places(plan, values)
     values += _not_measured(plan, values, absent)
     return replace(

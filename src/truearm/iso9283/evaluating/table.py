@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.engine.base.errors import Notice, Rule, counted
-from truearm.iso9283.criteria.compliance import WildPush
+from truearm.iso9283.criteria.compliance import OutlyingPush
+from truearm.iso9283.criteria.outlying_rows import Kind, OutlyingRow, TwoPlaces
 from truearm.iso9283.criteria.rows import Conditions, CopiedBlock, Cycles, Quantity, Value
-from truearm.iso9283.criteria.wild_rows import Kind, TwoPlaces, WildRow
 from truearm.iso9283.evaluating.comparison import Entry, ResultFile
 from truearm.iso9283.evaluating.doubts import other_cube
 from truearm.iso9283.evaluating.evaluation import Evaluation
@@ -204,17 +204,19 @@ _EACH_CYCLE: Final = ("AP", "AD", "AT", "AT-reorientation", "CR", "AV", "WS", "t
 _FAR_TURNED: Final = math.radians(2.0)
 
 
-WILD_ROW: Final = Rule(
-    "wild-row",
+OUTLYING_ROW: Final = Rule(
+    "outlying-row",
     "warning",
     "rows lie far from the other cycles of their pose; the values with and without them are said",
     cure="Look at the record, and measure the pose again if the reading was at fault.",
+    formerly="wild-row",
 )
-WILD_PUSH: Final = Rule(
-    "wild-push",
+OUTLYING_PUSH: Final = Rule(
+    "outlying-push",
     "warning",
     "readings under a push lie far from the line of the others; compliance with and without them is said",
     cure="Look at the record, and push again if the reading was at fault.",
+    formerly="wild-push",
 )
 TWO_PLACES: Final = Rule(
     "two-places",
@@ -244,21 +246,21 @@ PLACES_MISSING: Final = Rule(
 def row_notices(found: Evaluation) -> tuple[Notice, ...]:
     """Return what is to be known about the rows of an evaluation."""
     notices = []
-    wild, places = found.unusual.wild, found.unusual.two_places
-    if wild:
-        told = " ".join(_wild_words(row, "it" if len(wild) == 1 else "them") for row in wild[:_TOLD])
-        if len(wild) > _TOLD:
-            told += f" So do {counted(len(wild) - _TOLD, 'other row')}, on line "
-            told += f"{', '.join(str(int(row.of.line[0])) for row in wild[_TOLD:])}."
+    outlying, places = found.unusual.outlying, found.unusual.two_places
+    if outlying:
+        told = " ".join(_outlying_words(row, "it" if len(outlying) == 1 else "them") for row in outlying[:_TOLD])
+        if len(outlying) > _TOLD:
+            told += f" So do {counted(len(outlying) - _TOLD, 'other row')}, on line "
+            told += f"{', '.join(str(int(row.of.line[0])) for row in outlying[_TOLD:])}."
         notices.append(
-            WILD_ROW(
+            OUTLYING_ROW(
                 f"{told} The standard excludes no row, and none was left out.",
             )
         )
-    if found.wild_pushes:
-        told = " ".join(_push_words(push) for push in found.wild_pushes)
+    if found.outlying_pushes:
+        told = " ".join(_push_words(push) for push in found.outlying_pushes)
         notices.append(
-            WILD_PUSH(
+            OUTLYING_PUSH(
                 f"{told} The standard excludes no reading, and none was left out.",
             )
         )
@@ -402,7 +404,7 @@ def _copied_words(block: CopiedBlock) -> str:
     return f"{cycles}{block.test} {block.place}, {block.count} samples from lines {block.lines[0]} and {block.lines[1]}"
 
 
-def _wild_words(row: WildRow, without: str) -> str:
+def _outlying_words(row: OutlyingRow, without: str) -> str:
     away, scatter = (_size(number, row.kind) for number in (row.away, row.scatter))
     what = "The orientation of cycle" if row.kind == "orientation" else "Cycle"
     changes = "; ".join(_change_words(*pair, without) for pair in row.changes[:_VALUES])
@@ -412,7 +414,7 @@ def _wild_words(row: WildRow, without: str) -> str:
     )
 
 
-def _push_words(one: WildPush) -> str:
+def _push_words(one: OutlyingPush) -> str:
     unit, per_si = UNITS["compliance"]
     return (
         f"The push of {one.force:g} N along {one.direction} in cycle {one.cycle}, on line {one.line}, lies "

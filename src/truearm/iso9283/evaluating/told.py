@@ -14,7 +14,7 @@ from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.compliance import GRAVITY, PushLine
 from truearm.iso9283.criteria.drift import DriftCourse
-from truearm.iso9283.criteria.paths import wild_cycle
+from truearm.iso9283.criteria.paths import outlying_cycle
 from truearm.iso9283.criteria.rows import Instrument
 from truearm.iso9283.criteria.runs import Run
 from truearm.iso9283.criteria.streams import Clock, pace_along
@@ -255,7 +255,7 @@ _NAMED_PATHS = 5
 #: A path that is run at less than this share of the commanded velocity is said: on circles and weaves the robot slows
 #: down by itself.
 _SLOW = {"polyline": 0.5, "circle": 0.1, "weave": 0.1}
-#: Samples of a cycle on the way, its ends left aside, among which a corner is not taken for a wild sample.
+#: Samples of a cycle on the way, its ends left aside, among which a corner is not taken for an outlying sample.
 _LEAST_MOVING, _END = 90, 0.02
 #: Samples are missing where two are further apart than this share of the path, and than so many usual steps.
 _GAP, _GAP_STEPS = 0.06, 6.0
@@ -281,7 +281,7 @@ def said_of_streams(found: Evaluation) -> tuple[Notice, ...]:
     runs = _runs(found)
     notices = (
         _unusual(_records(found, runs)),
-        _wild(found),
+        _outlying(found),
         _gaps(runs),
         _slow(runs),
         _sparse(found),
@@ -422,28 +422,29 @@ def _sparse(found: Evaluation) -> Notice | None:
     )
 
 
-WILD_CYCLE: Final = Rule(
-    "wild-cycle",
+OUTLYING_CYCLE: Final = Rule(
+    "outlying-cycle",
     "warning",
     "cycles lie apart from the others of their path as a whole; AT and RT with and without them are said",
     cure="Look at the record, and measure the cycle again if the instrument or its mount moved.",
+    formerly="wild-cycle",
 )
 
 
-def _wild(found: Evaluation) -> Notice | None:
+def _outlying(found: Evaluation) -> Notice | None:
     named = []
     for path in found.deviations:
-        wild = wild_cycle(path)
-        if wild is None:
+        outlying = outlying_cycle(path)
+        if outlying is None:
             continue
-        cycle, far, accuracy, repeatability = wild
+        cycle, far, accuracy, repeatability = outlying
         now = f"RT is {1e3 * float(path.spread.max()):.4f} mm, without it {1e3 * repeatability:.4f}"
         now += f"; AT is {1e3 * float(path.distance.max()):.4f} mm, without it {1e3 * accuracy:.4f}"
         number = path.run.cycles[cycle].number
         named.append((far, f"cycle {number} of {_called(path.run)} by {1e3 * far:.4f} mm ({now})"))
     if not named:
         return None
-    return WILD_CYCLE(
+    return OUTLYING_CYCLE(
         f"Cycles lie apart from the others of their path as a whole: {_worst(named)}. The standard excludes no cycle, "
         "and none was left out.",
     )

@@ -485,7 +485,7 @@ class MappingFile(Entry):
         return self
 
     def _refuse_columns_used_twice(self) -> None:
-        """Refuse numbers that are taken from one column for two things: a slip that would go unnoticed."""
+        """Refuse numbers that are taken from one column for two things: a data-entry error that would go unnoticed."""
         used = [
             (column, f"readings[{number}].{name}")
             for number, entry in enumerate(self.readings, 1)

@@ -15,7 +15,7 @@ from truearm.checking.check import check
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.mapping import AnglesEntry
 from truearm.engine.data.readers.row_values import quaternions_of_angles
-from truearm.engine.diagnose.slip_trials import orientation_slips
+from truearm.engine.diagnose.entry_error_trials import orientation_entry_errors
 from truearm.engine.diagnose.wrong_robot import implausible
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
@@ -91,7 +91,7 @@ def read_otherwise(way: str) -> Dataset:
     ],
 )
 def test_the_convention_that_was_meant_is_named(way: str, code: str, words: str) -> None:
-    (notice,) = orientation_slips(load_robot(ROBOT), read_otherwise(way))
+    (notice,) = orientation_entry_errors(load_robot(ROBOT), read_otherwise(way))
     assert (notice.code, notice.level) == (code, "error")
     assert words in notice.message
 
@@ -102,7 +102,7 @@ def test_a_rotation_vector_that_was_read_as_angles_is_named() -> None:
         vectors = rotation_vector(rotation_from_quaternion(np.asarray(data.quaternion)))
         entry = AnglesEntry.model_validate({"columns": ["A", "B", "C"], "about": order, "axes": axes, "unit": "rad"})
         read = replace(data, quaternion=quaternions_of_angles(vectors, entry))
-        (notice,) = orientation_slips(load_robot(robot), read)
+        (notice,) = orientation_entry_errors(load_robot(robot), read)
         assert notice.code == "orientation-order"
         assert f"not angles about {order} of {axes} axes but a rotation vector" in notice.message
 
@@ -121,14 +121,14 @@ def test_the_fit_says_the_cause() -> None:
 
 def test_honest_orientations_are_left_alone() -> None:
     for robot, seed in product(("irb120", "ur10", "katana450"), range(20)):
-        assert not orientation_slips(load_robot(robot), with_orientations(robot, 12, seed)), (robot, seed)
+        assert not orientation_entry_errors(load_robot(robot), with_orientations(robot, 12, seed)), (robot, seed)
 
 
 def test_orientations_that_nothing_explains_are_given_no_name() -> None:
     for seed in range(3):
         drawn = np.random.default_rng(seed).normal(size=(len(sound().target), 4))
         data = replace(sound(), quaternion=drawn / np.linalg.norm(drawn, axis=1, keepdims=True))
-        assert not orientation_slips(load_robot(ROBOT), data.of_configurations(np.arange(6))), seed
+        assert not orientation_entry_errors(load_robot(ROBOT), data.of_configurations(np.arange(6))), seed
 
 
 # -- single rows ---------------------------------------------------------------------------------------------

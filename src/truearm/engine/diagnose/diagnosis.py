@@ -9,12 +9,6 @@ from typing import Final
 
 from truearm.engine.base.errors import Notice, Rule, counted, worst_first
 from truearm.engine.diagnose.advice import check_far_from_nominal, check_fit
-from truearm.engine.diagnose.arrivals import (
-    JOINTS_NOT_SETTLED,
-    check_arrival_lag,
-    check_separate_visits,
-    joints_as_far_off,
-)
 from truearm.engine.diagnose.case import Case
 from truearm.engine.diagnose.changes import OF_CHANGES
 from truearm.engine.diagnose.curves import check_curves, check_curves_of_loads, check_one_sided
@@ -28,6 +22,12 @@ from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.next_steps import steps_after_fit
 from truearm.engine.diagnose.plausibility import JOINTS_ROUNDED
 from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver
+from truearm.engine.diagnose.visits import (
+    JOINTS_NOT_SETTLED,
+    check_separate_visits,
+    check_visit_lag,
+    joints_as_far_off,
+)
 from truearm.engine.fit.transmission import check_transmission
 
 # Is what a fit leaves more than joints miss by, where no deviation is declared that would say so.
@@ -41,15 +41,16 @@ from truearm.engine.fit.transmission import check_transmission
 _LARGEST: Final = math.radians(0.02)
 
 
-LARGE_REMAINDER: Final = Rule(
-    "large-remainder",
+LARGE_RESIDUAL: Final = Rule(
+    "large-residual",
     "warning",
     "no sigma is declared, and a model that fits the geometry leaves the readings farther off than joints miss by",
     unless=OF_CHANGES | {WRONG_DATA, JOINTS_NOT_SETTLED.code, JOINTS_ROUNDED.code},
+    formerly="large-remainder",
 )
 
 
-def check_remainder(left: LeftOver) -> list[Notice]:
+def check_residual(left: LeftOver) -> list[Notice]:
     """Return a notice if readings without declared deviations are left farther off than joints miss by.
 
     Nothing is said of models that leave the geometry alone: they leave it by design.
@@ -62,8 +63,8 @@ def check_remainder(left: LeftOver) -> list[Notice]:
         return []
     off, more = math.degrees(seeming), "" if fit.model.tried else " (try `model=auto`)"
     return [
-        LARGE_REMAINDER(
-            f"The readings are left as far off as if every joint missed by {off:.2g} deg at each arrival. Arms repeat "
+        LARGE_RESIDUAL(
+            f"The readings are left as far off as if every joint missed by {off:.2g} deg at each visit. Arms repeat "
             "to less than 0.01 deg. No deviation is declared, so all of that counts as noise and errors of the joints. "
             f"Look for what the {fit.model.name} model lacks{more}, for joint positions that were rounded "
             "or taken before the arm stood still, for an instrument or a base that moved, and for readings of another "
@@ -73,7 +74,7 @@ def check_remainder(left: LeftOver) -> list[Notice]:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Diagnosis:
     """What is said of a fit."""
 
     expected: ExpectedError  #: How accurate the robot is where it was not measured.
@@ -84,7 +85,7 @@ class Judgement:
 def _check_narrow(case: Case) -> list[Notice]:
     """Say if the workspace is known worse than the readings that judge the fit say.
 
-    Deviations that are too large, and readings that the parameters take up, are not mended by more configurations.
+    Deviations that are too large, and readings that the parameters take up, are not corrected by more configurations.
     """
     too_large, hiding = case.sigma
     if (case.few and not case.held_out) or (too_large and not hiding):
@@ -103,8 +104,8 @@ CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
     lambda case: check_curves_of_loads(case.left),
     lambda case: check_far_from_nominal(case.fit),
     lambda case: case.changes,
-    lambda case: check_arrival_lag(case.left),
-    lambda case: check_remainder(case.left),
+    lambda case: check_visit_lag(case.left),
+    lambda case: check_residual(case.left),
     _check_narrow,
     lambda case: case.of_split,
     lambda case: check_payload(case.fit.start),
@@ -118,10 +119,10 @@ CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
 )
 
 
-def judge(case: Case) -> Judgement:
+def diagnose(case: Case) -> Diagnosis:
     """Judge a fit: ask every check, leave out what others silence, and say what to do next."""
     warnings = worst_first(case.unsilenced([notice for check in CHECKS for notice in check(case)]))
-    return Judgement(case.expected, warnings, steps_after_fit(case, warnings))
+    return Diagnosis(case.expected, warnings, steps_after_fit(case, warnings))
 
 
 JUDGED_IN_PART: Final = Rule(

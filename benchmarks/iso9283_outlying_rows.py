@@ -1,6 +1,6 @@
-"""How often wild rows and second places of rest are named: in clean campaigns, and in those that have them.
+"""How often outlying rows and second places of rest are named: in clean campaigns, and in those that have them.
 
-    python benchmarks/iso9283_wild_rows.py [campaigns]
+    python benchmarks/iso9283_outlying_rows.py [campaigns]
 
 Campaigns have the poses of ``iso9283 plan``: AP alone (5 poses of 30 cycles), all tests of poses (57 groups), and all
 with five cycles each. Poses scatter as balls, discs or needles, from group to group up to three times as much. A row is
@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from truearm.engine.robot.chain import Array
+from truearm.iso9283.criteria.outlying_rows import unusual_rows
 from truearm.iso9283.criteria.rows import Cycles, Instrument
-from truearm.iso9283.criteria.wild_rows import unusual_rows
 
 SHAPES = ([1.0, 1.0, 1.0], [1.0, 1.0, 0.1], [3.0, 1.0, 0.3], [1.0, 0.1, 0.02])
 TRACKER = Instrument(1e-9)
@@ -95,11 +95,11 @@ def main(trials: int) -> None:
     """Print the shares."""
     rng = np.random.default_rng(1)
     for name in CAMPAIGNS:
-        sys.stdout.write(f"{name}: campaigns with a wild row named, with two places named\n")
+        sys.stdout.write(f"{name}: campaigns with an outlying row named, with two places named\n")
         for kind in (*KINDS, "two places, 50 %", "two places, 30 %", "two places, 10 %"):
             found = [unusual_rows(campaign(rng, name, kind), TRACKER) for _ in range(trials)]
-            wild, two = np.mean([[bool(one.wild), bool(one.two_places)] for one in found], axis=0)
-            sys.stdout.write(f"  {kind:18} {100 * wild:5.1f} % {100 * two:5.1f} %\n")
+            outlying, two = np.mean([[bool(one.outlying), bool(one.two_places)] for one in found], axis=0)
+            sys.stdout.write(f"  {kind:18} {100 * outlying:5.1f} % {100 * two:5.1f} %\n")
         sys.stdout.write("  named of rows that are 5, 7, 10, 15, 30, 100 times off\n")
         for kind, rows in (("Gaussian", 1), ("Gaussian", 3), ("Student, 5", 1)):
             hits = []
@@ -108,7 +108,7 @@ def main(trials: int) -> None:
                 for _ in range(trials // 3):
                     groups = campaign(rng, name, kind)
                     lines = spoilt(rng, groups, times, rows)
-                    named = {int(one.of.line[0]) for one in unusual_rows(groups, TRACKER).wild}
+                    named = {int(one.of.line[0]) for one in unusual_rows(groups, TRACKER).outlying}
                     share += len(lines & named) / rows / (trials // 3)
                 hits.append(f"{100 * share:4.0f} %")
             sys.stdout.write(f"  {kind}, {rows} row{'s' * (rows > 1)}: {', '.join(hits)}\n")

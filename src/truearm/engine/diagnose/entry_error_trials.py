@@ -1,4 +1,4 @@
-"""Slips with units, signs, orders, axes and orientations, each as the data would be with it corrected."""
+"""Data-entry errors with units, signs, orders, axes and orientations, each as the data would be with it corrected."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ ROWS_SHIFTED: Final = Rule(
 
 
 @dataclass(frozen=True, eq=False)
-class Slip:
-    """One slip, mended."""
+class EntryError:
+    """One data-entry error, corrected."""
 
     rule: Rule  #: Of the notice.
     words: str  #: What happened and what to do about it, without a full stop.
@@ -89,14 +89,14 @@ class Slip:
 # -- lengths -----------------------------------------------------------------------------------------------
 
 
-def length_slips(data: Dataset) -> Iterator[Slip]:
+def length_entry_errors(data: Dataset) -> Iterator[EntryError]:
     """Try lengths in another unit."""
     for factor, words in LENGTH_FACTORS:
         if factor > 1.0 and np.nanmax(np.abs(data.position), initial=0.0) * factor > FARTHEST:
             continue
         what = "positions" if data.fixture is None else "lengths"
-        words = f"The {what} are {words}. Mend the unit in the header"
-        yield Slip(UNIT_LENGTH, words, _scaled(data, factor))
+        words = f"The {what} are {words}. Fix the unit in the header"
+        yield EntryError(UNIT_LENGTH, words, _scaled(data, factor))
 
 
 def _scaled(data: Dataset, factor: float) -> Dataset:
@@ -110,7 +110,7 @@ def _scaled(data: Dataset, factor: float) -> Dataset:
     return replace(data, position=data.position * factor, **more)  # type: ignore[arg-type]
 
 
-def scale_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+def scale_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
     """Try the factor by which readings are larger than the robot, from the linear map that takes them onto it.
 
     Of ``B y = R_c t + p_c + u`` the map B, the targets t and u are found by least squares. Where B stretches all axes
@@ -137,14 +137,16 @@ def scale_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     if stretch[2] <= 0.0:
         return
     if stretch[0] > _MOST_UNEVEN * stretch[2]:
-        yield from _column_slips(data, onto)
+        yield from _column_entry_errors(data, onto)
         return
     factor = float(np.prod(stretch)) ** (1 / 3)
     size = f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
-    yield Slip(UNIT_LENGTH, f"The positions are {size} for this robot. Mend them or their unit", _scaled(data, factor))
+    yield EntryError(
+        UNIT_LENGTH, f"The positions are {size} for this robot. Fix them or their unit", _scaled(data, factor)
+    )
 
 
-def _column_slips(data: Dataset, onto: Array) -> Iterator[Slip]:
+def _column_entry_errors(data: Dataset, onto: Array) -> Iterator[EntryError]:
     """Try single columns of positions in another unit, from the linear map that takes readings onto the robot."""
     stretch = np.linalg.norm(onto, axis=0)
     turned = onto / stretch
@@ -153,18 +155,18 @@ def _column_slips(data: Dataset, onto: Array) -> Iterator[Slip]:
         return
     sizes = [f"{1 / by:.4g} times too large" if by < 1 else f"{by:.4g} times too small" for by in stretch.tolist()]
     words = " and ".join(f"the column {axis} of the positions is {sizes[i]}" for i, axis in enumerate("xyz") if off[i])
-    mended = data.position * np.where(off, stretch, 1.0)
-    words = f"For this robot {words}. Mend the unit in the header, or the numbers"
-    yield Slip(UNIT_LENGTH, words, replace(data, position=mended))
+    corrected = data.position * np.where(off, stretch, 1.0)
+    words = f"For this robot {words}. Fix the unit in the header, or the numbers"
+    yield EntryError(UNIT_LENGTH, words, replace(data, position=corrected))
 
 
-def mirrored(data: Dataset) -> Iterator[Slip]:
+def mirrored(data: Dataset) -> Iterator[EntryError]:
     """Try the mirror image of the positions."""
     words = (
         "The positions are mirrored: two of the columns x, y and z are exchanged, or the sign of one is wrong. The "
-        "data fit with their mirror image. Mend the columns; an instrument's axes are right-handed"
+        "data fit with their mirror image. Fix the columns; an instrument's axes are right-handed"
     )
-    yield Slip(MIRRORED, words, replace(data, position=data.position * np.array([1.0, 1.0, -1.0])))
+    yield EntryError(MIRRORED, words, replace(data, position=data.position * np.array([1.0, 1.0, -1.0])))
 
 
 # -- joints ------------------------------------------------------------------------------------------------
@@ -174,7 +176,7 @@ def _turning(data: Dataset) -> list[int]:
     return [i for i in range(data.joints.shape[1]) if data.joint_kinds[i] == "revolute"]
 
 
-def angle_slips(data: Dataset) -> Iterator[Slip]:
+def angle_entry_errors(data: Dataset) -> Iterator[EntryError]:
     """Try joint positions in the other unit of angle, of all joints or of one."""
     turning = _turning(data)
     for factor, words in ((math.pi / 180, "degrees are called rad"), (180 / math.pi, "radians are called deg")):
@@ -184,11 +186,11 @@ def angle_slips(data: Dataset) -> Iterator[Slip]:
             joints = data.joints.copy()
             joints[:, group] *= factor
             which = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
-            words_of = f"{which}: {words}. Mend the unit in the header"
-            yield Slip(UNIT_ANGLE, words_of, replace(data, joints=joints))
+            words_of = f"{which}: {words}. Fix the unit in the header"
+            yield EntryError(UNIT_ANGLE, words_of, replace(data, joints=joints))
 
 
-def mixed_angle_slips(data: Dataset) -> Iterator[Slip]:
+def mixed_angle_entry_errors(data: Dataset) -> Iterator[EntryError]:
     """Try the other unit of angle at those configurations whose joint positions are of its size, and not at the others.
 
     No joint turns farther than one and a half turns to one side. Radians that are called degrees lie within 9.4 deg in
@@ -209,11 +211,11 @@ def mixed_angle_slips(data: Dataset) -> Iterator[Slip]:
         joints[np.ix_(which, np.array(turning))] *= factor
         first = ", ".join(data.labels[c] for c in which[:_MOST_NAMED].tolist())
         some = f"{first} and others" if len(which) > _MOST_NAMED else first
-        words_of = f"The joints: {words}, at some configurations alone ({some}). Mend the numbers of these rows"
-        yield Slip(UNIT_ANGLE, words_of, replace(data, joints=joints))
+        words_of = f"The joints: {words}, at some configurations alone ({some}). Fix the numbers of these rows"
+        yield EntryError(UNIT_ANGLE, words_of, replace(data, joints=joints))
 
 
-def controller_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+def controller_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
     """Try joint positions as those that the controller shows, and the other way round."""
     controller = robot.controller
     if not controller.counts_otherwise:
@@ -223,52 +225,55 @@ def controller_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
             "The joints look like the controller's: the data fit with them as the robot file says that its controller "
             "counts. Name the columns axis_1, axis_2 and so on, or import them with `joints_are=controller`"
         )
-        yield Slip(JOINTS_OF_CONTROLLER, words, replace(data, joints=controller.to_model(data.joints)))
+        yield EntryError(JOINTS_OF_CONTROLLER, words, replace(data, joints=controller.to_model(data.joints)))
         return
     words = (
         "The joints look like the model's, and came as the controller's: the data fit with them as they are. Name the "
         "columns joint_1, joint_2 and so on, or import them with `joints_are=model`"
     )
-    yield Slip(JOINTS_OF_MODEL, words, replace(data, joints=controller.from_model(data.joints)))
+    yield EntryError(JOINTS_OF_MODEL, words, replace(data, joints=controller.from_model(data.joints)))
 
 
-def as_noted(robot: Robot, data: Dataset, slips: Callable[[Dataset], Iterator[Slip]]) -> Iterator[Slip]:
-    """Try slips with joint positions on those that were noted: on the controller's, where they came as such."""
+def as_noted(robot: Robot, data: Dataset, entries: Callable[[Dataset], Iterator[EntryError]]) -> Iterator[EntryError]:
+    """Try data-entry errors on joint positions as they were noted: on the controller's, where they came as such."""
     if data.joints_are != "converted":
-        yield from slips(data)
+        yield from entries(data)
         return
-    for slip in slips(in_controller_joints(robot, data)):
-        yield replace(slip, data=in_model_joints(robot, slip.data))
+    for entry in entries(in_controller_joints(robot, data)):
+        yield replace(entry, data=in_model_joints(robot, entry.data))
 
 
-def sign_slips(data: Dataset, size: int = 1) -> Iterator[Slip]:
+def sign_entry_errors(data: Dataset, size: int = 1) -> Iterator[EntryError]:
     """Try the opposite signs of so many joints at once."""
     for group in map(list, combinations(range(data.joints.shape[1]), size)):
         joints = data.joints.copy()
         joints[:, group] *= -1
         which = " and ".join(str(i + 1) for i in group)
         words = f"The sign of joint {which} is opposite to the robot's: the data fit with it changed. "
-        yield Slip(JOINT_SIGN, words + "Change it in the data, or correct the robot file", replace(data, joints=joints))
+        yield EntryError(
+            JOINT_SIGN, words + "Change it in the data, or correct the robot file", replace(data, joints=joints)
+        )
 
 
-def order_slips(data: Dataset) -> Iterator[Slip]:
+def order_entry_errors(data: Dataset) -> Iterator[EntryError]:
     """Try two joints exchanged."""
     for a, b in combinations(range(data.joints.shape[1]), 2):
         joints = data.joints.copy()
         joints[:, [a, b]] = joints[:, [b, a]]
         words = f"Joints {a + 1} and {b + 1} are in the wrong order: the data fit with the columns exchanged. "
-        yield Slip(JOINT_SIGN, words + "Exchange their columns", replace(data, joints=joints))
+        yield EntryError(JOINT_SIGN, words + "Exchange their columns", replace(data, joints=joints))
 
 
-def shifted(data: Dataset) -> Iterator[Slip]:
+def shifted(data: Dataset) -> Iterator[EntryError]:
     """Try the joint positions of the row before, and of the row after."""
     for by, words in ((1, "before"), (-1, "after")):
         joints = np.roll(data.joints, by, axis=0)
         said = f"The readings of each configuration fit the joint positions of the one {words} it: the columns are "
-        yield Slip(ROWS_SHIFTED, said + "shifted by one row. Shift them back", replace(data, joints=joints))
+        yield EntryError(ROWS_SHIFTED, said + "shifted by one row. Shift them back", replace(data, joints=joints))
 
 
-# Slips with orientations: quaternions in another order, turns the other way round, angles of another convention.
+# Data-entry errors with orientations: quaternions in another order, turns the other way round, angles of another
+# convention.
 #
 # Readings hold quaternions alone. What three angles they came from is not known, so every way to write three numbers is
 # tried as the one that was taken, with every other one as the one that was meant: the numbers are found again from the
@@ -287,15 +292,16 @@ ORIENTATION_ORDER: Final = Rule(
     "error",
     "orientations, all or some, that would turn as the robot does [if their angles were read "
     "otherwise](check.md#orientations-read-by-another-convention)",
-    cure="Mend the mapping, or whatever made quaternions of them.",
+    cure="Fix the mapping, or whatever made quaternions of them.",
 )
-ORIENTATION_SLIPS: Final = frozenset({QUATERNION_ORDER, ORIENTATION_ORDER})
+ORIENTATION_ENTRY_ERRORS: Final = frozenset({QUATERNION_ORDER, ORIENTATION_ORDER})
 #: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
 _TURNED_WITHIN: Final = 0.1
-#: A slip explains orientations that it leaves so near to the robot's [rad], and so many times nearer than they came.
+#: A data-entry error explains orientations that it leaves so near to the robot's [rad], and so many times nearer than
+#: they came.
 _EXPLAINED_WITHIN: Final = 0.03
 _LEAST_IMPROVEMENT: Final = 4.0
-#: Slips that leave so little more than the best one are as good.
+#: Data-entry errors that leave so little more than the best one are as good.
 _AS_GOOD: Final = 1.5
 #: So many ways that are as good are told one by one.
 _MOST_TOLD: Final = 3
@@ -316,8 +322,8 @@ _NUMBERS: Final = (
 )
 
 
-def orientation_slips(robot: Robot, data: Dataset) -> list[Notice]:
-    """Return which slip with orientations makes them agree with the robot; nothing if they do, or if none does.
+def orientation_entry_errors(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return which data-entry error makes orientations agree with the robot; nothing if they do, or if none does.
 
     Args:
         robot: The nominal robot, which is placed by the positions.
@@ -332,7 +338,9 @@ def orientation_slips(robot: Robot, data: Dataset) -> list[Notice]:
     given = readings.left(rotation_from_quaternion(read))
     if given <= _TURNED_WITHIN:
         return []
-    left, words = min((readings.left(rotation_from_quaternion(mended)), words) for words, mended in _of_numbers(read))
+    left, words = min(
+        (readings.left(rotation_from_quaternion(corrected)), words) for words, corrected in _of_numbers(read)
+    )
     if left * _LEAST_IMPROVEMENT <= given:
         return [QUATERNION_ORDER(f"The quaternions do not turn as the robot does: {words}.")]
     if readings.rows < _FEWEST:
@@ -345,7 +353,7 @@ def _of_numbers(read: Array) -> Iterator[tuple[str, Array]]:
     yield "they turn the other way round, as transposed matrices do. Change the sign of qw", read * _INVERSE
     for words, order in _NUMBERS:
         yield f"{words}. Exchange the columns", read[:, order]
-        yield f"{words}, and they turn the other way round. Mend the columns", read[:, order] * _INVERSE
+        yield f"{words}, and they turn the other way round. Fix the columns", read[:, order] * _INVERSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -423,7 +431,7 @@ def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]
     ]
 
 
-def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], Rule, str]:
+def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], Rule, str]:
     """Return which single orientations turn as they should when they are read otherwise, the rule, and how in words.
 
     Of all ways the one is taken that explains most of them: it must explain two, or one by the order of a quaternion.
@@ -434,7 +442,7 @@ def slips_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], Rul
     """
     turned = rotation_from_quaternion(read)
     allowed = np.minimum(_EXPLAINED_WITHIN, _angles_between([turned], predicted) / _IMPROVEMENT_OF_ROWS)
-    of_numbers = [(0, words, [rotation_from_quaternion(mended)]) for words, mended in _of_numbers(read)]
+    of_numbers = [(0, words, [rotation_from_quaternion(corrected)]) for words, corrected in _of_numbers(read)]
     for rule, fewest, ways in (
         (QUATERNION_ORDER, 1, of_numbers),
         (ORIENTATION_ORDER, _FEWEST_ROWS, _other_conventions(turned)),

@@ -1,4 +1,4 @@
-"""Joint errors at arrivals: lag, separate visits, and declared deviations that are far too large."""
+"""Joint errors at visits: lag, separate visits, and declared deviations that are far too large."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from truearm.engine.base.units import from_si
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver, chi_squared_tail
-from truearm.engine.fit.likelihood import Arrivals, Linearised
+from truearm.engine.fit.likelihood import Linearised, Visits
 from truearm.engine.fit.rounds import DECLARED, factors_of
 from truearm.engine.fit.variance_components import Variances, largest_likelihood
 from truearm.engine.robot.chain import Array
 
-# How likely the readings are if arrivals, their noise or the errors of the joints were others than the fit took.
+# How likely the readings are if visits, their noise or the errors of the joints were others than the fit took.
 #
 # The fit groups readings by configuration and takes declared deviations as they are. What it leaves can be asked
 # whether something else is more likely: by the same restricted likelihood, with the parameters integrated out at the
@@ -33,21 +33,21 @@ _CONFIGURATIONS: Final = 100
 
 
 @dataclass(frozen=True, eq=False)
-class ArrivalLikelihood:
+class VisitLikelihood:
     """The likelihood of what a fit leaves."""
 
     left: LeftOver  #: What it leaves.
-    at: Linearised  #: The fit linearised there, with arrivals as they are taken; outliers left out.
+    at: Linearised  #: The fit linearised there, with visits as they are taken; outliers left out.
     factors: tuple[str, ...]  #: What the variances of readings are counted under.
 
     @classmethod
-    def of(cls, left: LeftOver, *, each_reading: bool = False) -> ArrivalLikelihood:
-        """Take the arrivals of the data, or every reading as one of its own."""
+    def of(cls, left: LeftOver, *, each_reading: bool = False) -> VisitLikelihood:
+        """Take the visits of the data, or every reading as one of its own."""
         problem, free = left.problem, left.fit.free
         values = np.array([left.fit.robot.values[name] for name in free.names])
         names, factor = factors_of(problem)
         of_reading = _readings(left)
-        arrivals = of_reading if each_reading else problem.arrivals
+        visits = of_reading if each_reading else problem.visits
         kept = _no_outliers(left.residual, of_reading) & _some(left)
         return cls(
             left,
@@ -57,7 +57,7 @@ class ArrivalLikelihood:
                 by_joints=problem.at(values).by_joints[kept],
                 offset=(values - free.nominal) / free.prior,
                 priors=True,
-                arrivals=Arrivals(np.unique(arrivals[kept], return_inverse=True)[1].reshape(-1)),
+                visits=Visits(np.unique(visits[kept], return_inverse=True)[1].reshape(-1)),
                 factor=factor[kept],
             ),
             tuple(names),
@@ -145,16 +145,16 @@ def _no_outliers(residual: Array, of_reading: NDArray[np.intp]) -> NDArray[np.bo
 # from the recorded one by a small lag with the sign of the last move. These lags, one a joint, are fitted to the
 # residuals of the identified model, after removing what its own parameters could still take.
 
-#: Part of the residuals that the direction of arrival must explain, and of the joints that must lag with one sign.
+#: Part of the residuals that the direction of visit must explain, and of the joints that must lag with one sign.
 _LEAST_EXPLAINED: Final = 0.05
 _LEAST_OF_ONE_SIGN: Final = 2 / 3
-#: Noise alone must show a direction of arrival that explains as much less often than this.
+#: Noise alone must show a direction of visit that explains as much less often than this.
 _LARGEST_CHANCE: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class ArrivalLag:
-    """What the arrival direction explains."""
+    """What the visit direction explains."""
 
     share: float  #: Part of the residual's root mean square that it explains, corrected for the number of joints.
     #: Probability that noise alone shows as much. The targets of a configuration share what the model leaves, so it
@@ -172,8 +172,8 @@ class ArrivalLag:
         return told and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
 
-def arrival_lag(left_over: LeftOver) -> ArrivalLag | None:
-    """Return what arrival directions explain of the residuals of a fit.
+def visit_lag(left_over: LeftOver) -> ArrivalLag | None:
+    """Return what visit directions explain of the residuals of a fit.
 
     None where too few readings are left, or where the order of measurement is not known.
     """
@@ -215,9 +215,9 @@ JOINTS_NOT_SETTLED: Final = Rule(
 )
 
 
-def check_arrival_lag(left_over: LeftOver) -> list[Notice]:
+def check_visit_lag(left_over: LeftOver) -> list[Notice]:
     """Return a notice if the joints were not at rest."""
-    found = arrival_lag(left_over)
+    found = visit_lag(left_over)
     if found is None or not found.fires:
         return []
     units = ["deg" if kind == "revolute" else "mm" for kind in left_over.problem.data.joint_kinds]
@@ -232,7 +232,7 @@ def check_arrival_lag(left_over: LeftOver) -> list[Notice]:
     ]
 
 
-# Were the targets of a configuration read on separate visits, although the data call it one arrival.
+# Were the targets of a configuration read on separate visits, although the data call it one visit.
 #
 # The robot then stopped anew for every target, and what the joints missed by differs from reading to reading. It still
 # looks like errors of joints: it grows with the distance from their axes. So the likelihood in which all readings of a
@@ -242,7 +242,7 @@ def check_arrival_lag(left_over: LeftOver) -> list[Notice]:
 #: same parameters, so it is the difference of their Bayesian information criteria; beyond 10 it is very strong (Kass
 #: and Raftery 1995, "Bayes factors", section 3.2), and noise that is no sphere has given 15.
 _LEAST_GAIN: Final = 20.0
-#: Variance that errors of the joints make of that of the noise, at least: below it nothing depends on arrivals.
+#: Variance that errors of the joints make of that of the noise, at least: below it nothing depends on visits.
 _LEAST_SHARE: Final = 0.5
 #: Configurations with two readings or more, without which nothing is said.
 _LEAST_SHARED: Final = 8
@@ -264,7 +264,7 @@ def check_separate_visits(left: LeftOver) -> list[Notice]:
     several = np.bincount(data.configuration[data.has_reading]) > 1
     if data.visit is not None or int(several.sum()) < _LEAST_SHARED:
         return []
-    together, apart = ArrivalLikelihood.of(left), ArrivalLikelihood.of(left, each_reading=True)
+    together, apart = VisitLikelihood.of(left), VisitLikelihood.of(left, each_reading=True)
     variances, each = apart.largest()
     if apart.share_of_joints(variances) < _LEAST_SHARE:
         return []
@@ -273,7 +273,7 @@ def check_separate_visits(left: LeftOver) -> list[Notice]:
         return []
     return [
         SEPARATE_VISITS(
-            "The readings of a configuration err as joints err, but each by itself, where readings of one arrival "
+            "The readings of a configuration err as joints err, but each by itself, where readings of one visit "
             "share the errors of the joints. So the targets were read on separate visits: the robot left and came back "
             "between them.",
         )
@@ -316,7 +316,7 @@ SIGMA_TOO_LARGE: Final = Rule(
 # the directions of the singular value decomposition of its Jacobian per prior each parameter is found alone, so no fit
 # is repeated.
 #
-# Where joints err at every arrival the residuals are large for that reason, and a sigma that is too large takes a part
+# Where joints err at every visit the residuals are large for that reason, and a sigma that is too large takes a part
 # of it for noise. So the likelihood with that sigma is compared with the one in which the noise is free.
 def check_sigma(left: LeftOver) -> list[Notice]:
     """Return a notice if the declared deviations of the readings are far too large."""
@@ -354,14 +354,14 @@ def check_sigma(left: LeftOver) -> list[Notice]:
         return [
             SIGMA_TOO_LARGE(
                 f"{words}. So the priors hold the robot near its nominal values, and it is "
-                f"{_rounded(declared / found)} times farther from the readings than it need be. Mend sigma or its "
+                f"{_rounded(declared / found)} times farther from the readings than it need be. Fix sigma or its "
                 "unit, or leave it out: the noise is then estimated.",
                 "error",
             )
         ]
     return [
         SIGMA_TOO_LARGE(
-            f"{words}. The deviations of the parameters are too large by about as much. Mend sigma or its unit, or "
+            f"{words}. The deviations of the parameters are too large by about as much. Fix sigma or its unit, or "
             "leave it out: the noise is then estimated.",
         )
     ]
@@ -373,7 +373,7 @@ def check_sigma_beside_joints(left: LeftOver) -> list[Notice]:
         return []
     if len(left.residual) - float(np.sum(left.strength**2 / (left.strength**2 + 1.0))) < _LEAST_FREEDOM:
         return []
-    readings = ArrivalLikelihood.of(left)
+    readings = VisitLikelihood.of(left)
     free, gained = readings.largest()
     kept, before = readings.largest((DECLARED,))
     share = float(np.sqrt(free.factors[readings.factors.index(DECLARED)]))

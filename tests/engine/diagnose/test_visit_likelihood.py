@@ -1,4 +1,4 @@
-"""What the likelihood says of declared deviations and of arrivals; joint positions in coarse steps."""
+"""What the likelihood says of declared deviations and of visits; joint positions in coarse steps."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 from tests.simulated import campaign
 
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.diagnose.arrivals import check_separate_visits, check_sigma_beside_joints, joints_as_far_off
 from truearm.engine.diagnose.plausibility import check_rounding, step_of
 from truearm.engine.diagnose.unmodelled import LeftOver
+from truearm.engine.diagnose.visits import check_separate_visits, check_sigma_beside_joints, joints_as_far_off
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.library import load_robot
@@ -21,7 +21,7 @@ NOISE = 2e-5
 
 
 def missing_by(deviation: float, seed: int, *, each_target: bool = False) -> Dataset:
-    """Return readings of a robot whose joints miss by so much [deg] at every arrival, or anew for each target."""
+    """Return readings of a robot whose joints miss by so much [deg] at every visit, or anew for each target."""
     twin, data = campaign("irb120", 30, NOISE, seed)
     rng = np.random.default_rng(seed)
     position = data.position.copy()

@@ -4,13 +4,13 @@ One row 5 mm off among thirty makes RP 3 mm. Nothing is left out for that: the s
 named, with what the values would be without it.
 
 How far a row is from the others is divided by how these scatter, each group of cycles by its own scatter, and where
-a group has fewer than eight, by that of all such groups of the test. Rows are taken as wild, the furthest first, if
+a group has fewer than eight, by that of all such groups of the test. Rows are taken as outlying, the furthest first, if
 each is beyond what a Gaussian has once in a few million rows, and further by a factor than the furthest of all that
 are left in the campaign. So what tails the robot has is learnt from the campaign itself: tails as those of Student's t
 with five degrees of freedom give no more than a few false names in a hundred campaigns. Rows at the same pose that are
 off alike, three or more, are no accident: the tip rests in two places there.
 
-How often that is right was measured by simulation: ``benchmarks/iso9283_wild_rows.py``.
+How often that is right was measured by simulation: ``benchmarks/iso9283_outlying_rows.py``.
 """
 
 from __future__ import annotations
@@ -102,28 +102,28 @@ _SMALL: Final = 8
 _CAUTION: Final = 1.6
 #: So many degrees of freedom are needed to say what is far.
 _LEAST_FREEDOM: Final = 6
-#: A wild row is so many deviations away, as a Gaussian's are counted, and further than those left by these factors: one
-#: alone, and several.
+#: An outlying row is so many deviations away, as a Gaussian's are counted, and further than those left by these
+#: factors: one alone, and several.
 _FAR: Final = 5.0
 _BEYOND: Final = (2.2, 1.8)
 #: What is counted as a Gaussian's deviation: where Student's t is as rare as this.
 _RARE: Final = 1e-5
 #: The scatter is never taken below this share of the instrument's, nor below that of rounding.
 _LEAST_SCATTER: Final = 1.0 / 3.0
-#: At most this share of all rows is wild, but three may be.
+#: At most this share of all rows is outlying, but three may be.
 _SHARE: Final = 0.02
 #: Offsets that differ by less than this share are alike, and so many are no accident.
 _ALIKE: Final = 1.0 / 3.0
 _ALIKE_ROWS: Final = 3
 #: Two places are told from one of so many cycles, by the distance of two halves over the scatter within them.
-_LEAST_CYCLES_WILD_ROWS: Final = 20
+_LEAST_CYCLES_OUTLYING_ROWS: Final = 20
 _APART: Final = 7.0
 
 Kind = Literal["position", "orientation"]
 
 
 @dataclass(frozen=True, eq=False)
-class WildRow:
+class OutlyingRow:
     """A row that lies far from the other cycles of its pose."""
 
     of: Cycles  #: It alone, with what it was measured under.
@@ -132,7 +132,7 @@ class WildRow:
     #: rad].
     away: float
     scatter: float
-    changes: tuple[tuple[Value, Value], ...] = ()  #: Values that it is in, and the same without all wild rows.
+    changes: tuple[tuple[Value, Value], ...] = ()  #: Values that it is in, and the same without all outlying rows.
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ class TwoPlaces:
 class UnusualRows:
     """What is unusual about the rows of a campaign."""
 
-    wild: tuple[WildRow, ...] = ()  #: Rows that lie far from the others.
+    outlying: tuple[OutlyingRow, ...] = ()  #: Rows that lie far from the others.
     two_places: tuple[TwoPlaces, ...] = ()  #: Poses with two places of rest.
     alike: tuple[AlikeCycles, ...] = ()  #: Tests whose cycles are like those before them.
 
@@ -158,7 +158,7 @@ class UnusualRows:
 def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRows:
     """Return rows that lie far from the others, in the order of the plan, and what else is unusual about them."""
     groups = [part for cycle in cycles for part in (groups_of(cycle) if cycle.test == "dAP" else [cycle])]
-    wild: list[WildRow] = []
+    outlying: list[OutlyingRow] = []
     two: list[TwoPlaces] = []
     kinds: tuple[Kind, Kind] = ("position", "orientation")
     for kind, least in zip(kinds, instrument.least_scatter(_LEAST_SCATTER), strict=True):
@@ -166,15 +166,15 @@ def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRow
         if mine:
             rows = _Rows(mine, kind, least)
             places = rows.two_places()
-            named, alike = rows.wild(places)
-            wild += named
+            named, alike = rows.outlying(places)
+            outlying += named
             two += [*places.values(), *alike]
-    return UnusualRows(tuple(wild), tuple(two), alike_cycles(cycles))
+    return UnusualRows(tuple(outlying), tuple(two), alike_cycles(cycles))
 
 
-def without(cycles: Sequence[Cycles], wild: Sequence[WildRow]) -> list[Cycles]:
+def without(cycles: Sequence[Cycles], outlying: Sequence[OutlyingRow]) -> list[Cycles]:
     """Return cycles without some rows."""
-    lines = np.array([int(one.of.line[0]) for one in wild])
+    lines = np.array([int(one.of.line[0]) for one in outlying])
     left = [cycle.rows(~np.isin(cycle.line, lines)) for cycle in cycles]
     return [one for one in left if len(one)]
 
@@ -200,7 +200,7 @@ class _Rows:
         """Return the groups whose cycles are in two places, three cycles or more in each."""
         found = {}
         for number, (group, begin, n) in enumerate(zip(self.groups, self.begin, self.counts, strict=True)):
-            if n >= _LEAST_CYCLES_WILD_ROWS:
+            if n >= _LEAST_CYCLES_OUTLYING_ROWS:
                 split = _split(self.numbers[begin : begin + n], self.floor)
                 if split is not None:
                     apart, fewer = split
@@ -208,13 +208,13 @@ class _Rows:
                     found[number] = TwoPlaces(group, self.kind, apart, (len(fewer), n - len(fewer)), lines)
         return found
 
-    def wild(self, places: dict[int, TwoPlaces]) -> tuple[list[WildRow], list[TwoPlaces]]:
-        """Return wild rows that are in no second place of rest, and second places that are seen by them."""
+    def outlying(self, places: dict[int, TwoPlaces]) -> tuple[list[OutlyingRow], list[TwoPlaces]]:
+        """Return outlying rows that are in no second place of rest, and second places that are seen by them."""
         chosen = self._furthest()
         rows = np.array([row for row in np.flatnonzero(chosen) if self.group[row] not in places], dtype=np.intp)
         means, offset = self._means(chosen), self._offsets()
         keys = [(one.test, one.robot, one.pose, one.approach, one.velocity, one.load) for one in self.groups]
-        named: list[WildRow] = []
+        named: list[OutlyingRow] = []
         alike: dict[tuple[object, ...], TwoPlaces] = {}
         for row in rows:
             group = self.groups[self.group[row]]
@@ -231,21 +231,21 @@ class _Rows:
             about = others - others.mean(axis=0) if len(others) else np.zeros((1, 3))
             scatter = float(np.sqrt((about**2).sum() / max(len(others) - 1, 1)))
             number = row - self.begin[self.group[row]]
-            named.append(WildRow(group.rows(slice(number, number + 1)), self.kind, away, scatter))
+            named.append(OutlyingRow(group.rows(slice(number, number + 1)), self.kind, away, scatter))
         return named, list(alike.values())
 
     def _furthest(self) -> NDArray[np.bool_]:
         """Return which rows are further than all others by more than tails do."""
         n = len(self.numbers)
         order = np.argsort(-self._from_medians(), kind="stable")
-        wild = np.zeros(n, dtype=bool)
+        outlying = np.zeros(n, dtype=bool)
         for k in range(1, min(max(3, int(_SHARE * n)), n // 4) + 1):
             chosen = np.zeros(n, dtype=bool)
             chosen[order[:k]] = True
             far = self._deviations(chosen)
             if far[chosen].min() > max(_FAR, _BEYOND[min(k, 2) - 1] * far[~chosen].max()):
-                wild = chosen
-        return wild
+                outlying = chosen
+        return outlying
 
     def _from_medians(self) -> Array:
         """Return the distance of each row from the median of its group over what the nearest four fifths scatter by."""

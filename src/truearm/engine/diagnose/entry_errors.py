@@ -1,7 +1,7 @@
-"""Slips that people make with units, signs, orders and axes, tried one by one on data that the robot does not fit.
+"""Data-entry errors with units, signs, orders and axes, tried one by one on data that the robot does not fit.
 
 The nominal robot is placed by the closed form. Where that fails badly, the same data are tried as they would be with
-one slip mended; the simplest slip that makes them fit several times better is what happened.
+one data-entry error corrected; the simplest data-entry error that makes them fit several times better is what happened.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.rigid_tool import FARTHEST, LENGTH_FACTORS, UNIT_LENGTH, factors_of, lengths_noticed
 from truearm.engine.data.statistics import Errors, errors_of
-from truearm.engine.diagnose.slip_trials import (
-    Slip,
-    angle_slips,
+from truearm.engine.diagnose.entry_error_trials import (
+    EntryError,
+    angle_entry_errors,
     as_noted,
-    controller_slips,
-    length_slips,
+    controller_entry_errors,
+    length_entry_errors,
     mirrored,
-    mixed_angle_slips,
-    order_slips,
-    orientation_slips,
-    scale_slips,
+    mixed_angle_entry_errors,
+    order_entry_errors,
+    orientation_entry_errors,
+    scale_entry_errors,
     shifted,
-    sign_slips,
+    sign_entry_errors,
 )
 from truearm.engine.fit.frames import initial_frames, placed_errors
 from truearm.engine.fit.models import named_model
@@ -62,7 +62,7 @@ _FOLLOWS: Final = 0.1
 _ROUNDS: Final = 2
 
 
-def mixed_length_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
+def mixed_length_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
     """Try another unit of length of those positions that it explains, where it explains no whole target.
 
     Args:
@@ -83,7 +83,7 @@ def mixed_length_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
     if (factor == 1.0).all():
         return
     words, at = lengths_noticed(data, factor)
-    yield Slip(UNIT_LENGTH, words, replace(data, position=data.position * factor[:, None]), at)
+    yield EntryError(UNIT_LENGTH, words, replace(data, position=data.position * factor[:, None]), at)
 
 
 def _placed(robot: Robot, data: Dataset) -> Robot | None:
@@ -111,9 +111,9 @@ def _placed(robot: Robot, data: Dataset) -> Robot | None:
     for _ in range(_ROUNDS):
         predicted = _predicted(best, data)
         factor = factors_of(data.position, predicted, _allowed(data, predicted))
-        mended = replace(data, position=data.position * factor[:, None])
-        near = np.linalg.norm(mended.position - predicted, axis=1) <= _allowed(data, predicted)
-        best = initial_frames(robot, mended.of_readings(near & data.has_position))
+        corrected = replace(data, position=data.position * factor[:, None])
+        near = np.linalg.norm(corrected.position - predicted, axis=1) <= _allowed(data, predicted)
+        best = initial_frames(robot, corrected.of_readings(near & data.has_position))
     return best
 
 
@@ -137,7 +137,7 @@ def _allowed(data: Dataset, predicted: Array) -> float:
     return _ALLOWED * float(np.median(_gaps(data.position[read], predicted[read])))
 
 
-# How well a robot fits distances from points nobody measured, without a fit of the robot: quick enough to try slips.
+# How well a robot fits distances from points nobody measured, without a fit of the robot: quick enough to try many.
 #
 # The place t of the target on the flange and the centres c are the only unknowns of ``|p_i + R_i t - c_f| = d_i``.
 # Places on a coarse grid around the flange, each with its centres in closed form, are starts; Levenberg's steps go on
@@ -245,12 +245,12 @@ _PLACED_WITHIN_BY_FIXTURES: Final = 6e-3
 _PLAINLY_OFF: Final = 2.0
 #: Share of the rows that stay, beside others in another unit: fewer of a campaign are about zero by chance.
 _MANY_ROWS: Final = 0.05
-#: A slip explains the data if they fit this many times better with it mended.
+#: A data-entry error explains the data if they fit this many times better with it corrected.
 _LEAST_IMPROVEMENT: Final = 4.0
-#: Beside a slip whose mending makes the data fit this many times better, nothing else is wrong.
+#: Beside a data-entry error whose correction makes the data fit this many times better, nothing else is wrong.
 _PLAIN_IMPROVEMENT: Final = 20.0
-#: A simpler slip is preferred to one that fits this many times better: mirrored readings and the opposite signs of
-#: joints 1, 4 and 6 are the same for an arm that is its own mirror image, up to its errors.
+#: A simpler data-entry error is preferred to one that fits this many times better: mirrored readings and the opposite
+#: signs of joints 1, 4 and 6 are the same for an arm that is its own mirror image, up to its errors.
 _AS_GOOD: Final = 1.5
 #: Configurations looked at; more tell nothing new.
 _CONFIGURATIONS_TRIED: Final = 60
@@ -268,14 +268,14 @@ _ALIKE: Final = 0.8
 _LEAST_OF_REACH: Final = 0.02
 #: No target is farther from the flange [m].
 _LARGEST_TOOL: Final = 2.0
-#: Weight of readings against priors where slips are judged by a fit [m or rad].
+#: Weight of readings against priors where data-entry errors are judged by a fit [m or rad].
 _FITTED_NOISE: Final = 1e-4
 
 
-def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
-    """Return which slip explains positions in the instrument's frame; nothing if they fit, or if none does."""
+def entry_errors_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return which data-entry error explains positions in the instrument's frame; nothing if all or none fit."""
     data, robot = _few_targets(data), robot.with_frames(Transform(), {})  # made once for all that is tried
-    turned = orientation_slips(robot, _some(data))
+    turned = orientation_entry_errors(robot, _some(data))
     some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
     some = replace(some, quaternion=None, sigma_rot=None)
     seen = [t for t in range(len(some.targets)) if (some.has_position & (some.target == t)).any()]
@@ -285,71 +285,79 @@ def slips_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     bad = [t for t, size in misfit.items() if size > max(_PLACED_WITHIN, _LEAST_IMPROVEMENT * least)]
     if not bad and least <= _PLACED_WITHIN:
         return turned
-    rows = _best(robot, some, (replace(slip, data=_some(slip.data)) for slip in mixed_length_slips(robot, rest)))
+    rows = _best(
+        robot,
+        some,
+        (replace(entry, data=_some(entry.data)) for entry in mixed_length_entry_errors(robot, rest)),
+    )
     if rows is not None:
         return [rows.notice]
     if not bad:
         best = _best(
             robot,
             some,
-            _simple_slips(robot, rest),
-            lambda: [slip for size in (2, 3) for slip in as_noted(robot, some, partial(sign_slips, size=size))],
+            _simple_entry_errors(robot, rest),
+            lambda: [
+                entry for size in (2, 3) for entry in as_noted(robot, some, partial(sign_entry_errors, size=size))
+            ],
         )
         if best is not None:
             return [best.notice]
-        return turned or _two_slips(robot, rest) or _beyond_reach(robot, some) or _unrelated(robot, some)
+        return turned or _two_entry_errors(robot, rest) or _beyond_reach(robot, some) or _unrelated(robot, some)
     # The other targets fit with the same joints, so these are right.
     found = []
     for t in bad:
         only = _only(some, t)
-        best = _best(robot, only, [*length_slips(only), *mirrored(only), *scale_slips(robot, only)])
+        best = _best(robot, only, [*length_entry_errors(only), *mirrored(only), *scale_entry_errors(robot, only)])
         if best is not None:
             found.append(best.rule(f"Target {some.targets[t]}: {best.words}."))
     return [*turned, *found] or _beyond_reach(robot, some)
 
 
-def _two_slips(robot: Robot, data: Dataset) -> list[Notice]:
-    """Say if lengths in another unit and one slip more explain the data: a unit alone is told by no size."""
+def _two_entry_errors(robot: Robot, data: Dataset) -> list[Notice]:
+    """Say if lengths in another unit and one data-entry error more explain the data: no size tells a unit alone."""
     some = _some(data)
     if _size_over_reach(robot, some) <= 1.0:
         return []
-    for lengths in length_slips(some):
-        mended = next(slip.data for slip in length_slips(data) if slip.words == lengths.words)
+    for lengths in length_entry_errors(some):
+        corrected = next(entry.data for entry in length_entry_errors(data) if entry.words == lengths.words)
         if not _LEAST_OF_REACH < _size_over_reach(robot, lengths.data) <= 1.0:
             continue
-        best = _best(robot, lengths.data, _simple_slips(robot, mended))
+        best = _best(robot, lengths.data, _simple_entry_errors(robot, corrected))
         if best is not None:
             return [lengths.notice, best.notice]
     return []
 
 
-def _simple_slips(robot: Robot, data: Dataset) -> Iterator[Slip]:
-    """Try everything but several slips at once, the simplest first."""
+def _simple_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
+    """Try everything but several data-entry errors at once, the simplest first."""
     some = _some(data)
-    yield from length_slips(some)
-    yield from _angle_slips(robot, some)
-    yield from controller_slips(robot, some)
+    yield from length_entry_errors(some)
+    yield from _angle_entry_errors(robot, some)
+    yield from controller_entry_errors(robot, some)
     yield from mirrored(some)
-    yield from as_noted(robot, some, sign_slips)
-    yield from as_noted(robot, some, order_slips)
-    yield from (replace(slip, data=_some(slip.data)) for slip in shifted(data))
-    yield from scale_slips(robot, some)
+    yield from as_noted(robot, some, sign_entry_errors)
+    yield from as_noted(robot, some, order_entry_errors)
+    yield from (replace(entry, data=_some(entry.data)) for entry in shifted(data))
+    yield from scale_entry_errors(robot, some)
 
 
-def _angle_slips(robot: Robot, data: Dataset) -> list[Slip]:
+def _angle_entry_errors(robot: Robot, data: Dataset) -> list[EntryError]:
     """Try other units of angle, of some rows first where only these can be in it, and the others are many enough."""
-    whole, some = (list(as_noted(robot, data, slips)) for slips in (angle_slips, mixed_angle_slips))
-    first = [slip for slip in some if (slip.data.joints == data.joints).all(axis=1).mean() > _MANY_ROWS]
-    return [*first, *whole, *(slip for slip in some if slip not in first)]
+    whole, some = (list(as_noted(robot, data, entries)) for entries in (angle_entry_errors, mixed_angle_entry_errors))
+    first = [entry for entry in some if (entry.data.joints == data.joints).all(axis=1).mean() > _MANY_ROWS]
+    return [*first, *whole, *(entry for entry in some if entry not in first)]
 
 
-def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[[], list[Slip]] = list) -> Slip | None:
-    """Return the simplest slip that explains the data, None if none does.
+def _best(
+    robot: Robot, data: Dataset, entries: Iterable[EntryError], several: Callable[[], list[EntryError]] = list
+) -> EntryError | None:
+    """Return the simplest data-entry error that explains the data, None if none does.
 
     Args:
-        several: Several slips at once, tried where none alone makes the data fit as if nothing else were wrong.
+        several: Several at once, tried where none alone makes the data fit as if nothing else were wrong.
     """
-    tried = list(slips)
+    tried = list(entries)
     if not tried:
         return None
     given = _misfit(robot, data) / _spread(data)
@@ -359,14 +367,14 @@ def _best(robot: Robot, data: Dataset, slips: Iterable[Slip], several: Callable[
         tried += more
         shares += _shares(robot, more)
     least = min(shares)
-    best = next(slip for slip, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
+    best = next(entry for entry, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
     return best if least * _LEAST_IMPROVEMENT < given else None
 
 
-def _shares(robot: Robot, slips: Sequence[Slip]) -> list[float]:
-    """Return how badly each slip fits in proportion to how far its readings lie apart."""
-    errors = placed_errors(robot, [slip.data for slip in slips])
-    return [float(np.median(off)) / _spread(slip.data) for off, slip in zip(errors, slips, strict=True)]
+def _shares(robot: Robot, entries: Sequence[EntryError]) -> list[float]:
+    """Return how badly each data-entry error fits in proportion to how far its readings lie apart."""
+    errors = placed_errors(robot, [entry.data for entry in entries])
+    return [float(np.median(off)) / _spread(entry.data) for off, entry in zip(errors, entries, strict=True)]
 
 
 FIXTURES_UNLIKELY: Final = Rule(
@@ -376,30 +384,30 @@ FIXTURES_UNLIKELY: Final = Rule(
 )
 
 
-def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
-    """Return the first slip that explains readings against fixtures: turned about, several may fit alike."""
+def entry_errors_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
+    """Return the first data-entry error that explains readings against fixtures: several may fit alike."""
     size = _misfit(robot, data)
     if size <= _PLACED_WITHIN_BY_FIXTURES:
         return []
-    for slip in (
-        *length_slips(data),
-        *_angle_slips(robot, data),
-        *controller_slips(robot, data),
-        *as_noted(robot, data, sign_slips),
-        *as_noted(robot, data, order_slips),
+    for entry in (
+        *length_entry_errors(data),
+        *_angle_entry_errors(robot, data),
+        *controller_entry_errors(robot, data),
+        *as_noted(robot, data, sign_entry_errors),
+        *as_noted(robot, data, order_entry_errors),
     ):
-        travel, before = (np.ptp(one.joints, axis=0) for one in (slip.data, data))
+        travel, before = (np.ptp(one.joints, axis=0) for one in (entry.data, data))
         less = travel < 0.5 * before
         if min(travel.max(), travel[less].max(initial=0.0) if less.any() else np.inf) < _LEAST_TRAVEL:
             continue  # an arm that hardly moves fits any fixture, and so does a joint that would hardly move
-        quick = quick_misfit(robot, slip.data)
+        quick = quick_misfit(robot, entry.data)
         if quick is not None and quick > _PLAINLY_OFF * _PLACED_WITHIN_BY_FIXTURES:
             continue
-        mended = _misfit(robot, slip.data)
-        if mended <= _PLACED_WITHIN_BY_FIXTURES and _LEAST_IMPROVEMENT * mended / _spread(slip.data) < size / _spread(
-            data
-        ):
-            return [slip.notice]
+        corrected = _misfit(robot, entry.data)
+        if corrected <= _PLACED_WITHIN_BY_FIXTURES and _LEAST_IMPROVEMENT * corrected / _spread(
+            entry.data
+        ) < size / _spread(data):
+            return [entry.notice]
     return [
         FIXTURES_UNLIKELY(
             "The nominal robot does not fit the readings against fixtures. Half of them are off by more than "
@@ -410,7 +418,7 @@ def slips_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
     ]
 
 
-def slips_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
+def entry_errors_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
     """Return the joint whose opposite sign, or the mirror image that, explains what a fit leaves over.
 
     The targets may be so near the axis of the last joint, or the campaign so narrow, that the placed nominal robot
@@ -419,11 +427,11 @@ def slips_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
     """
     some = _some(replace(_few_targets(data), quaternion=None, sigma=None, sigma_rot=None))
     given = _fitted_misfit(robot, some)
-    tries = [*controller_slips(robot, some), *mirrored(some), *as_noted(robot, some, sign_slips)]
-    tried = [(_fitted_misfit(robot, slip.data), slip) for slip in tries]
+    tries = [*controller_entry_errors(robot, some), *mirrored(some), *as_noted(robot, some, sign_entry_errors)]
+    tried = [(_fitted_misfit(robot, entry.data), entry) for entry in tries]
     least = min(left for left, _ in tried)
-    slip = next(slip for left, slip in tried if left <= _AS_GOOD * least)
-    return [slip.notice] if least * _LEAST_IMPROVEMENT < given else []
+    entry = next(entry for left, entry in tried if left <= _AS_GOOD * least)
+    return [entry.notice] if least * _LEAST_IMPROVEMENT < given else []
 
 
 def _fitted_misfit(robot: Robot, data: Dataset) -> float:

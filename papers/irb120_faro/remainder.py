@@ -91,7 +91,7 @@ def _columns(jacobian: Array, points: Array, joints: Array) -> dict[str, Array]:
 
     steady = np.repeat(time[:, None], joints.shape[1], axis=1)
     return {
-        "direction of visit of each joint": turning(moves),
+        "direction of approach of each joint": turning(moves),
         "angle of each joint, three harmonics": turning(*harmonics),
         "steady drift of the whole robot": rigid * time[:, None, None, None],
         "steady drift of each joint": turning(steady),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.diagnose.test_visit_lag import ON_A_TRACK
+from tests.engine.diagnose.test_approach_lag import ON_A_TRACK
 from tests.expecting import known
 from tests.simulated import campaign
 

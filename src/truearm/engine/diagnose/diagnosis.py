@@ -24,8 +24,8 @@ from truearm.engine.diagnose.plausibility import JOINTS_ROUNDED
 from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver
 from truearm.engine.diagnose.visits import (
     JOINTS_NOT_SETTLED,
+    check_approach_lag,
     check_separate_visits,
-    check_visit_lag,
     joints_as_far_off,
 )
 from truearm.engine.fit.transmission import check_transmission
@@ -104,7 +104,7 @@ CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
     lambda case: check_curves_of_loads(case.left),
     lambda case: check_far_from_nominal(case.fit),
     lambda case: case.changes,
-    lambda case: check_visit_lag(case.left),
+    lambda case: check_approach_lag(case.left),
     lambda case: check_residual(case.left),
     _check_narrow,
     lambda case: case.of_split,

@@ -173,8 +173,8 @@ def repeatability(data: Dataset, sigma: float) -> Repeatability | None:
     at = data.configuration[read]
     keys = np.stack([postures[at], data.target[read]])
     sets = np.unique(keys, axis=1, return_inverse=True)[1].reshape(-1)
-    visit = np.unique(np.stack([sets, at, visit]), axis=1, return_inverse=True)[1].reshape(-1)
-    first = np.unique(visit, return_index=True)[1]  # several readings on one visit say nothing of the next
+    together = np.unique(np.stack([sets, at, visit]), axis=1, return_inverse=True)[1].reshape(-1)
+    first = np.unique(together, return_index=True)[1]  # several readings on one visit say nothing of the next
     sets, at, visit, place = sets[first], at[first], visit[first], data.position[read][first]
     count = np.bincount(sets)
     again = count[sets] > 1

@@ -145,16 +145,16 @@ def _no_outliers(residual: Array, of_reading: NDArray[np.intp]) -> NDArray[np.bo
 # from the recorded one by a small lag with the sign of the last move. These lags, one a joint, are fitted to the
 # residuals of the identified model, after removing what its own parameters could still take.
 
-#: Part of the residuals that the direction of visit must explain, and of the joints that must lag with one sign.
+#: Part of the residuals that the direction of approach must explain, and of the joints that must lag with one sign.
 _LEAST_EXPLAINED: Final = 0.05
 _LEAST_OF_ONE_SIGN: Final = 2 / 3
-#: Noise alone must show a direction of visit that explains as much less often than this.
+#: Noise alone must show a direction of approach that explains as much less often than this.
 _LARGEST_CHANCE: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class ArrivalLag:
-    """What the visit direction explains."""
+    """What the approach direction explains."""
 
     share: float  #: Part of the residual's root mean square that it explains, corrected for the number of joints.
     #: Probability that noise alone shows as much. The targets of a configuration share what the model leaves, so it
@@ -172,8 +172,8 @@ class ArrivalLag:
         return told and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
 
-def visit_lag(left_over: LeftOver) -> ArrivalLag | None:
-    """Return what visit directions explain of the residuals of a fit.
+def approach_lag(left_over: LeftOver) -> ArrivalLag | None:
+    """Return what approach directions explain of the residuals of a fit.
 
     None where too few readings are left, or where the order of measurement is not known.
     """
@@ -215,9 +215,9 @@ JOINTS_NOT_SETTLED: Final = Rule(
 )
 
 
-def check_visit_lag(left_over: LeftOver) -> list[Notice]:
+def check_approach_lag(left_over: LeftOver) -> list[Notice]:
     """Return a notice if the joints were not at rest."""
-    found = visit_lag(left_over)
+    found = approach_lag(left_over)
     if found is None or not found.fires:
         return []
     units = ["deg" if kind == "revolute" else "mm" for kind in left_over.problem.data.joint_kinds]

@@ -12,7 +12,7 @@ from tests.simulated import campaign
 
 from truearm import Dataset, calibrate, load_robot
 from truearm.engine.diagnose.unmodelled import LeftOver
-from truearm.engine.diagnose.visits import check_visit_lag
+from truearm.engine.diagnose.visits import check_approach_lag
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
@@ -45,14 +45,14 @@ def test_rows_in_another_order_say_the_same(measured: Dataset) -> None:
     shuffled = measured.of_configurations(np.random.default_rng(0).permutation(measured.configurations))
     assert "joints-not-settled" in {n.code for n in calibrate("ur5", shuffled).warnings}
     fit = fitted(load_robot("ur5"), measured)
-    assert check_visit_lag(LeftOver.of(fit, shuffled)) == check_visit_lag(LeftOver.of(fit, measured))
+    assert check_approach_lag(LeftOver.of(fit, shuffled)) == check_approach_lag(LeftOver.of(fit, measured))
 
 
 def test_without_numbers_nothing_is_said_of_visits(measured: Dataset) -> None:
     fit = fitted(load_robot("ur5"), measured)
     unnumbered = replace(measured, number=None, approach=None)
-    assert check_visit_lag(LeftOver.of(fit, unnumbered)) == []
-    assert check_visit_lag(LeftOver.of(fit, measured)) != []
+    assert check_approach_lag(LeftOver.of(fit, unnumbered)) == []
+    assert check_approach_lag(LeftOver.of(fit, measured)) != []
 
 
 ON_A_TRACK = """truearm: truearm-robot/1
@@ -76,7 +76,7 @@ def test_the_lag_of_a_sliding_joint_is_said_in_mm(tmp_path: Path) -> None:
     twin = truth_twin(robot, "random", rng)
     data = measure(twin, robot.random_configurations(80, rng), 0.05e-3, rng)
     data = late(twin.robot, data, np.array([0.2e-3, *np.radians([0.02] * 3)]))
-    (notice,) = check_visit_lag(LeftOver.of(fitted(robot, data), data))
+    (notice,) = check_approach_lag(LeftOver.of(fitted(robot, data), data))
     lags = re.findall(r"([+-][0-9.]+) (deg|mm)", notice.message)
     assert [unit for _, unit in lags] == ["mm", "deg", "deg", "deg"]
     assert [abs(float(lag)) for lag, _ in lags] == pytest.approx([0.2, 0.02, 0.02, 0.02], rel=0.2)

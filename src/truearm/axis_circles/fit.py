@@ -496,26 +496,12 @@ TABLES: Final = ("standard-dh", "s-model", "hayati")
 _LARGEST_MISFIT: Final = 2.0
 
 
-LEFT_OUT: Final = Rule(
-    "left-out",
-    "warning",
-    "configurations that belong to no run",
-)
-NO_CIRCLE: Final = Rule(
-    "no-circle",
-    "warning",
-    "a target that was not used in a run",
-)
+LEFT_OUT: Final = Rule("left-out", "warning", "configurations that belong to no run")
+NO_CIRCLE: Final = Rule("no-circle", "warning", "a target that was not used in a run")
 NOT_CIRCULAR: Final = Rule(
-    "not-circular",
-    "warning",
-    "the points are further from their circles than their deviations allow",
+    "not-circular", "warning", "the points are further from their circles than their deviations allow"
 )
-MISFIT: Final = Rule(
-    "misfit",
-    "warning",
-    "the robot's convention cannot hold the measured axes",
-)
+MISFIT: Final = Rule("misfit", "warning", "the robot's convention cannot hold the measured axes")
 
 
 @dataclass(frozen=True, eq=False)
@@ -650,7 +636,7 @@ class AxisAnalysis:
             said.append(
                 LEFT_OUT(
                     f"{self.found.left_out} of {self.data.configurations} configurations belong to no run in which one"
-                    " joint moves alone, and were not used.",
+                    " joint moves alone, and were not used."
                 )
             )
         said += [NO_CIRCLE(f"A target was not used in one run. {refusal}") for refusal in self.found.refused]
@@ -659,7 +645,7 @@ class AxisAnalysis:
                 NOT_CIRCULAR(
                     f"The points are {self.found.excess:.2g} times further from their circles than the declared"
                     " deviations allow. The arm gives way, or something moved. All deviations are widened by that"
-                    " factor.",
+                    " factor."
                 )
             )
         misfit = self.calibrated.residual
@@ -668,7 +654,7 @@ class AxisAnalysis:
                 MISFIT(
                     f"The convention {self.nominal.convention_name} leaves {misfit:.2g} deviations between the robot's"
                     " axes and the measured ones. If axes are parallel, convert the robot to hayati or to joint-errors."
-                    " Otherwise the arm does not turn about fixed axes.",
+                    " Otherwise the arm does not turn about fixed axes."
                 )
             )
         return tuple(said)

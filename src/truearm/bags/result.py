@@ -62,7 +62,7 @@ class ImportedBag(Record):
         return (
             MESSAGES_MISSING(
                 f"About {lost} of {lost + kept} messages of the joints are missing, by the times of the others. "
-                "Motions shorter than the gaps are not seen.",
+                "Motions shorter than the gaps are not seen."
             ),
         )
 

@@ -140,9 +140,7 @@ _BAR: Final = 20
 
 
 NOT_SIMULATED: Final = Rule(
-    "not-simulated",
-    "note",
-    "no calibration was simulated, because the fit leaves open what predictions depend on",
+    "not-simulated", "note", "no calibration was simulated, because the fit leaves open what predictions depend on"
 )
 
 
@@ -164,7 +162,7 @@ def simulate_calibrations(
         return None, [
             NOT_SIMULATED(
                 f"No calibration was simulated, because this one ended with {fit.status.value}: intervals say nothing "
-                "of what the data do not determine.",
+                "of what the data do not determine."
             )
         ]
 

@@ -24,7 +24,7 @@ _TURNED: Final = 0.01
 #: With so few targets and no frame, a correction without a mean is no correction.
 _FEW_TARGETS: Final = 3
 _LISTED: Final = 5
-_NOTHING_CORRECTED: Final = Rule(
+NOTHING_CORRECTED: Final = Rule(
     "nothing-corrected",
     "warning",
     "all targets stay, or only one is left to correct and nothing says where its frame is",
@@ -37,41 +37,20 @@ _TOOL_APART: Final = 0.004
 
 
 TARGETS_SKIPPED: Final = Rule(
-    "targets-skipped",
-    "warning",
-    "targets that could not be corrected, which was accepted, with the reason",
-    gravity=2,
+    "targets-skipped", "warning", "targets that could not be corrected, which was accepted, with the reason", gravity=2
 )
-INSTRUCTIONS_UNKNOWN: Final = Rule(
-    "instructions-unknown",
-    "warning",
-    "instructions that truearm does not know",
-)
+INSTRUCTIONS_UNKNOWN: Final = Rule("instructions-unknown", "warning", "instructions that truearm does not know")
 CONFIGURATION_ON_EDGE: Final = Rule(
-    "configuration-on-edge",
-    "warning",
-    "targets that moved across the edge of their configuration",
+    "configuration-on-edge", "warning", "targets that moved across the edge of their configuration"
 )
 POSTURE_GUESSED: Final = Rule(
-    "posture-guessed",
-    "warning",
-    "nothing says in which posture the robot reaches its first pose",
+    "posture-guessed", "warning", "nothing says in which posture the robot reaches its first pose"
 )
-MOVES_NOT_DIVIDED: Final = Rule(
-    "moves-not-divided",
-    "warning",
-    "moves that `split` could not divide",
-)
+MOVES_NOT_DIVIDED: Final = Rule("moves-not-divided", "warning", "moves that `split` could not divide")
 LOAD_CHANGES: Final = Rule(
-    "load-changes",
-    "warning",
-    "the program changes what the robot carries, and the correction does not",
+    "load-changes", "warning", "the program changes what the robot carries, and the correction does not"
 )
-CARRIES_NOTHING: Final = Rule(
-    "no-payload",
-    "warning",
-    "the arm bends, and the robot carries nothing",
-)
+CARRIES_NOTHING: Final = Rule("no-payload", "warning", "the arm bends, and the robot carries nothing")
 
 
 def check_correction(
@@ -96,7 +75,7 @@ def check_correction(
         made.append(
             INSTRUCTIONS_UNKNOWN(
                 f"{_counted(sum(unknown.values()), 'unknown instruction')} left alone: {words}"
-                f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay.",
+                f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay."
             )
         )
     edges = [(correction, row) for correction in corrections for row in correction.on_edge]
@@ -105,14 +84,14 @@ def check_correction(
             CONFIGURATION_ON_EDGE(
                 f"{_counted(len(edges), 'target')} moved across the edge of a quadrant or turn of the configuration "
                 f"by a joint that stands on it, as at 0: {_lines(edges)}. Controllers "
-                "take the nearest posture there, but step through these first.",
+                "take the nearest posture there, but step through these first."
             )
         )
     if result.guessed:
         made.append(
             POSTURE_GUESSED(
                 f"Nothing says in which posture the robot reaches its first pose ({'; '.join(result.guessed)}): it was "
-                "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be.",
+                "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be."
             )
         )
     unsplit = sum(len(split.unsplit) for split in splits)
@@ -121,7 +100,7 @@ def check_correction(
             MOVES_NOT_DIVIDED(
                 f"{_counted(unsplit, 'straight or circular move')} not split: the start of such a move is not sure; or "
                 "a target was not corrected, is given by joints or is an offset; or the posture changes on the way; or "
-                f"{MOST_SEGMENTS} segments are not enough; or its instruction has options that segments cannot have.",
+                f"{MOST_SEGMENTS} segments are not enough; or its instruction has options that segments cannot have."
             )
         )
     made += _loads(robot, result)
@@ -132,25 +111,20 @@ def check_correction(
         made.append(
             LOAD_CHANGES(
                 "The programs change what the robot carries (GripLoad, TLoad, tload). Targets were corrected for the "
-                "load of the tool alone; where the robot carries more, the arm bends further than is expected here.",
+                "load of the tool alone; where the robot carries more, the arm bends further than is expected here."
             )
         )
     unweighed = not result.loads or None in result.loads.values()
     if robot.payload == NO_PAYLOAD and unweighed and any(effect.loaded for effect in robot.effects):
         made.append(
             CARRIES_NOTHING(
-                "The robot carries nothing in this correction. If its tool weighs something, give it with `payload`.",
+                "The robot carries nothing in this correction. If its tool weighs something, give it with `payload`."
             )
         )
     return tuple(made)
 
 
-NO_TARGETS: Final = Rule(
-    "no-targets",
-    "warning",
-    "the programs hold nothing to correct",
-    gravity=2,
-)
+NO_TARGETS: Final = Rule("no-targets", "warning", "the programs hold nothing to correct", gravity=2)
 
 
 def _corrected(result: CorrectedPrograms) -> list[Notice]:
@@ -164,10 +138,7 @@ def _corrected(result: CorrectedPrograms) -> list[Notice]:
 
 
 NOT_BETTER_HERE: Final = Rule(
-    "not-better-here",
-    "warning",
-    "targets that would rather get worse, and what became of them",
-    gravity=2,
+    "not-better-here", "warning", "targets that would rather get worse, and what became of them", gravity=2
 )
 
 
@@ -238,7 +209,7 @@ def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
         BEYOND_MEASURED(
             f"{_counted(len(found), 'target')} corrected although {_joints_beyond(robot, found)} stood well outside "
             f"the range measured in calibration: {_lines(found)}. What the model leaves out counts more there than "
-            "where it was measured.",
+            "where it was measured."
         )
     ]
 
@@ -258,21 +229,17 @@ def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
 def _nothing(alone: int) -> list[Notice]:
     """Say that no target was corrected, and why not if single ones were without a frame whose place is known."""
     if not alone:
-        return [_NOTHING_CORRECTED("Nothing was corrected: the programs are as they were.")]
+        return [NOTHING_CORRECTED("Nothing was corrected: the programs are as they were.")]
     left = "only one target is left to correct" if alone == 1 else f"{alone} targets are left, each alone in its frame"
     return [
-        _NOTHING_CORRECTED(
+        NOTHING_CORRECTED(
             f"Nothing can be corrected: {left}, and `frames` is not given. The error of a single target could as well "
-            f"be that of its frame. {'It stays as it is' if alone == 1 else 'They stay as they are'}: give `frames`.",
+            f"be that of its frame. {'It stays as it is' if alone == 1 else 'They stay as they are'}: give `frames`."
         )
     ]
 
 
-JOINT_TARGETS_KEPT: Final = Rule(
-    "joint-targets-kept",
-    "note",
-    "targets given by joints, which stay",
-)
+JOINT_TARGETS_KEPT: Final = Rule("joint-targets-kept", "note", "targets given by joints, which stay")
 
 
 def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
@@ -283,7 +250,7 @@ def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
     return [
         JOINT_TARGETS_KEPT(
             f"{counted(kept, 'target')} {stay}, as home positions should. Where one was computed from a place in "
-            "space, `joint_targets=correct` corrects it too.",
+            "space, `joint_targets=correct` corrects it too."
         )
     ]
 
@@ -337,21 +304,14 @@ def _apart(result: CorrectedPrograms) -> list[Notice]:
     return [
         TOOL_APART(
             f"Tools are not where the program has them on the flange: {words}. A flange that calibration cannot place "
-            "explains one or two millimetres.",
+            "explains one or two millimetres."
         )
     ]
 
 
-TOOLS_ASSUMED: Final = Rule(
-    "tools-assumed",
-    "warning",
-    "where base and flange were put, because the files do not say",
-)
+TOOLS_ASSUMED: Final = Rule("tools-assumed", "warning", "where base and flange were put, because the files do not say")
 FRAMES_ASSUMED: Final = Rule(
-    "frames-assumed",
-    "warning",
-    "where base and flange were put, because the files do not say",
-    gravity=2,
+    "frames-assumed", "warning", "where base and flange were put, because the files do not say", gravity=2
 )
 
 

@@ -170,7 +170,7 @@ def controller_notices(robot: Robot, programs: Sequence[Program]) -> list[Notice
         CONTROLLER_NOMINAL(
             f"Controllers of {calibration.maker} compute with what the factory measured of each arm, and the poses "
             "were corrected for one that computes with the data sheet, as was said. On an arm with its own "
-            "controller that makes programs worse; give its file with `controller_kinematics`.",
+            "controller that makes programs worse; give its file with `controller_kinematics`."
         )
     ]
 

@@ -351,7 +351,7 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
     if content.beside > _FAR:
         notices.append(
             BETWEEN_TARGETS(
-                f"Between its targets the program leaves the path by up to {millimetres(content.beside)} mm.",
+                f"Between its targets the program leaves the path by up to {millimetres(content.beside)} mm."
             )
         )
     untimed = [one.name for one in languages if content.untimed(one.name)]
@@ -359,7 +359,7 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
         notices.append(
             UNTIMED_MOVES(
                 f"{listed(untimed)} cannot say how long a joint motion takes: the robot goes as fast as it is set to, "
-                "and what motion adds to the loads is another than was corrected.",
+                "and what motion adds to the loads is another than was corrected."
             )
         )
     return texts

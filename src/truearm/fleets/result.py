@@ -46,10 +46,7 @@ WORKERS_DIED: Final = Rule(
     cure="Run it again with more memory, or leave these robots out.",
 )
 ROBOTS_FAILED: Final = Rule(
-    "robots-failed",
-    "warning",
-    "some robots could not be calibrated; each says why in `robots.csv`",
-    gravity=2,
+    "robots-failed", "warning", "some robots could not be calibrated; each says why in `robots.csv`", gravity=2
 )
 ROBOTS_IN_ERROR: Final = Rule(
     "robots-in-error",
@@ -64,9 +61,7 @@ NO_RESULT: Final = Rule(
     cure="Fix what their messages name, and run this again.",
 )
 ROBOTS_OUTDATED: Final = Rule(
-    "robots-outdated",
-    "warning",
-    "a robot failed, and `robots/NAME` holds what an earlier run found of it",
+    "robots-outdated", "warning", "a robot failed, and `robots/NAME` holds what an earlier run found of it"
 )
 
 
@@ -86,7 +81,7 @@ class Fleet(Record):
             found.append(
                 WORKERS_DIED(
                     f"Workers died again and again of parts with {counted(len(self.run.lost), 'robot')} "
-                    f"({listed(self.run.lost)}), and these are not in the result.",
+                    f"({listed(self.run.lost)}), and these are not in the result."
                 )
             )
         failed = self.analysis.failed
@@ -95,7 +90,7 @@ class Fleet(Record):
             found.append(
                 ROBOTS_FAILED(
                     f"{len(failed)} of {counted(self.analysis.measurements, 'robot')} could not be calibrated "
-                    f"({names}); the first: {failed[0][1]}",
+                    f"({names}); the first: {failed[0][1]}"
                 )
             )
         wrong = [look for look in self.analysis.looks if any(reason.why == "error" for reason in look.reasons)]
@@ -104,21 +99,19 @@ class Fleet(Record):
                 ROBOTS_IN_ERROR(
                     f"The {'result' if len(wrong) == 1 else 'results'} of {counted(len(wrong), 'robot')} "
                     f"({listed([look.robot for look in wrong])}) should not be used: calibrated alone, each ends "
-                    "with an error. No figure of the series contains them.",
+                    "with an error. No figure of the series contains them."
                 )
             )
         if self.analysis.usable == 0:
             found.append(
-                NO_RESULT(
-                    f"None of {counted(self.analysis.measurements, 'robot')} has a result that can be used.",
-                )
+                NO_RESULT(f"None of {counted(self.analysis.measurements, 'robot')} has a result that can be used.")
             )
         outdated = self._outdated()
         if outdated:
             found.append(
                 ROBOTS_OUTDATED(
                     f"{listed(outdated)} could not be calibrated, and what an earlier run wrote of it stands below "
-                    f"{ROBOTS}: remove these folders, or do not use them.",
+                    f"{ROBOTS}: remove these folders, or do not use them."
                 )
             )
         return (*found, *analysis_notices(self.analysis))

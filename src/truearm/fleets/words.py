@@ -307,9 +307,7 @@ ROBOTS_DIFFER: Final = Rule(
     "fleet proposes do not count them.",
 )
 ROBOTS_DRIFT: Final = Rule(
-    "robots-drift",
-    "warning",
-    "parameters of some machines changed from campaign to campaign by more than chance",
+    "robots-drift", "warning", "parameters of some machines changed from campaign to campaign by more than chance"
 )
 DRIFT_ALIKE: Final = Rule(
     "drift-alike",
@@ -338,7 +336,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
         notices.append(
             ROBOTS_DIFFER(
                 f"{counted(len(differing), 'robot')} {'differs' if len(differing) == 1 else 'differ'} from the others "
-                f"({listed(sorted(differing))}).",
+                f"({listed(sorted(differing))})."
             )
         )
     changed = list(dict.fromkeys(drift.machine for drift in found.drifts if drift.significant))
@@ -347,7 +345,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
             ROBOTS_DRIFT(
                 f"{counted(len(changed), 'machine')} changed between campaigns by more than chance "
                 f"({listed(changed)}). An instrument, a tool or a temperature that differed between the campaigns "
-                "looks the same.",
+                "looks the same."
             )
         )
     alike = [one.parameter for kind in found.kinds for one in kind.drifts.alike]
@@ -355,7 +353,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
         notices.append(
             DRIFT_ALIKE(
                 f"The same parameters changed alike in all machines ({listed(alike)}): what measured them has more "
-                "likely changed than all of them.",
+                "likely changed than all of them."
             )
         )
     others = [name for kind in found.kinds for name in kind.drifts.others]
@@ -363,7 +361,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
         notices.append(
             ANOTHER_MACHINE(
                 f"Most parameters of {listed(others)} changed from one campaign to the next by as much as robots "
-                "differ from one another.",
+                "differ from one another."
             )
         )
     undated = [name for kind in found.kinds for name in kind.drifts.undated]
@@ -371,7 +369,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
         notices.append(
             DRIFT_UNDATED(
                 f"{listed(undated)} {'was' if len(undated) == 1 else 'were'} measured several times, but not at two "
-                "different known dates, so no change is told.",
+                "different known dates, so no change is told."
             )
         )
     return notices

@@ -139,7 +139,7 @@ class HexapodSolution(Record):
             ATTACHMENTS_NOT_COMPARED(
                 f"The tool was attached {self.attached.count} times, and no configuration was measured with two of "
                 "the attachments: how well the tool changer repeats the cups is not known, and the data declare no "
-                "standard deviations.",
+                "standard deviations."
             ),
         )
 

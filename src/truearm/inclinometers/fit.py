@@ -461,11 +461,7 @@ def check_tilting(start: Robot, fit: TiltingFit, read: Inclinations, *, pushed: 
     )
 
 
-TILTING_NOT_CONVERGED: Final = Rule(
-    "tilting-not-converged",
-    "error",
-    "the solver's steps did not become small",
-)
+TILTING_NOT_CONVERGED: Final = Rule("tilting-not-converged", "error", "the solver's steps did not become small")
 
 
 def _not_converged(fit: TiltingFit) -> list[Notice]:
@@ -489,11 +485,7 @@ def _below_zero(fit: TiltingFit) -> list[Notice]:
     below = [p.name for p in parameters if p.value < -_BELOW * (p.deviation or math.inf)]
     if not below:
         return []
-    return [
-        TILTING_BELOW_ZERO(
-            f"{listed(below)}: found to be negative, which no spring, play or gap is.",
-        )
-    ]
+    return [TILTING_BELOW_ZERO(f"{listed(below)}: found to be negative, which no spring, play or gap is.")]
 
 
 INCLINATIONS_SCATTER: Final = Rule(
@@ -552,15 +544,11 @@ def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
         told.append(
             UPRIGHT_UNSEEN(
                 f"{_stay(by_poses)}: gravity does not turn a joint whose axis stands "
-                f"upright, and inclinometers do not see its turn. {cure}",
+                f"upright, and inclinometers do not see its turn. {cure}"
             )
         )
     if others:
-        told.append(
-            TILTING_UNSEEN(
-                f"{_stay(others)}: no change of load that was read tells them well.",
-            )
-        )
+        told.append(TILTING_UNSEEN(f"{_stay(others)}: no change of load that was read tells them well."))
     return told
 
 
@@ -582,11 +570,7 @@ def _upright(robot: Robot) -> Iterable[int]:
             yield joint + 1
 
 
-UNPAIRED: Final = Rule(
-    "unpaired",
-    "note",
-    "configurations without a partner were left out",
-)
+UNPAIRED: Final = Rule("unpaired", "note", "configurations without a partner were left out")
 
 
 def _unpaired(read: Inclinations) -> list[Notice]:
@@ -596,6 +580,6 @@ def _unpaired(read: Inclinations) -> list[Notice]:
         UNPAIRED(
             f"{counted(len(read.unpaired), 'configuration')} ({listed(read.unpaired)}) had no partner and "
             f"{'was' if len(read.unpaired) == 1 else 'were'} left out: those of the orders 1 and 2, 3 and 4 and so on "
-            "are compared.",
+            "are compared."
         )
     ]

@@ -56,11 +56,7 @@ class Mounting:
         return np.array([_turn_of(mount) for mount in self.mounts])
 
 
-INSTRUMENT_TURNED: Final = Rule(
-    "instrument-turned",
-    "note",
-    "an instrument sits turned by more than 5 deg on its link",
-)
+INSTRUMENT_TURNED: Final = Rule("instrument-turned", "note", "an instrument sits turned by more than 5 deg on its link")
 
 
 def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
@@ -97,7 +93,7 @@ def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
     if turned:
         notices.append(
             INSTRUMENT_TURNED(
-                f"By their angles instruments sit turned on their links: {listed(turned)}. This is taken into account.",
+                f"By their angles instruments sit turned on their links: {listed(turned)}. This is taken into account."
             )
         )
     return Mounting(found.mounts, found.zeros, tuple(notices))

@@ -425,7 +425,7 @@ def _compared(geometry: Calibration, alone: Calibration) -> list[Notice]:
         TILTING_NOT_BETTER(
             f"With tilt, backlash and compliance of the joints the poses are missed by {after.mean * 1e3:.3f} mm, by "
             f"the geometry alone by {before.mean * 1e3:.3f} mm: the joints of this robot tilt less than is known of "
-            "them, or something else is wrong with it or with the inclinations.",
+            "them, or something else is wrong with it or with the inclinations."
         )
     ]
 

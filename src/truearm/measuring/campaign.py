@@ -22,12 +22,7 @@ from truearm.measuring.sources import Incoming, Source
 _NAMED: Final = 5
 
 
-TORN_LINE: Final = Rule(
-    "torn-line",
-    "note",
-    "the log ended with a part of a line",
-    gravity=0,
-)
+TORN_LINE: Final = Rule("torn-line", "note", "the log ended with a part of a line", gravity=0)
 
 
 class Campaign:
@@ -119,42 +114,23 @@ class Campaign:
         return [
             TORN_LINE(
                 "The log ended with a part of a line, as where a machine is stopped: that reading was not confirmed, "
-                "and is measured again.",
+                "and is measured again."
             )
         ]
 
 
-CLOCK_BACK: Final = Rule(
-    "clock-back",
-    "warning",
-    "a reading has an earlier time than the one before",
-)
+CLOCK_BACK: Final = Rule("clock-back", "warning", "a reading has an earlier time than the one before")
 MANY_LEFT_OUT: Final = Rule(
     "many-left-out",
     "warning",
     "at more than half of the configurations every target was left out, and `not-seen` does not say so",
 )
-OTHER_ORDER: Final = Rule(
-    "other-order",
-    "note",
-    "not measured in the order of the plan",
-)
-NOT_JUDGED: Final = Rule(
-    "not-judged",
-    "note",
-    "nothing says how readings were taken",
-)
+OTHER_ORDER: Final = Rule("other-order", "note", "not measured in the order of the plan")
+NOT_JUDGED: Final = Rule("not-judged", "note", "nothing says how readings were taken")
 NESTS_MISSED: Final = Rule(
-    "nests-missed",
-    "warning",
-    "in some rounds not all nests were measured; where they were hidden",
+    "nests-missed", "warning", "in some rounds not all nests were measured; where they were hidden"
 )
-NO_NESTS: Final = Rule(
-    "no-nests",
-    "note",
-    "no nests were measured",
-    cure="Name them as `nests`.",
-)
+NO_NESTS: Final = Rule("no-nests", "note", "no nests were measured", cure="Name them as `nests`.")
 
 
 def session_notices(session: Session) -> list[Notice]:
@@ -165,7 +141,7 @@ def session_notices(session: Session) -> list[Notice]:
         found.append(
             CLOCK_BACK(
                 f"The clock went back before {_numbers(back)}. The order is that in which readings came; the drift of "
-                "nests over time may be wrong.",
+                "nests over time may be wrong."
             )
         )
     none = len(session.without_reading)
@@ -174,15 +150,13 @@ def session_notices(session: Session) -> list[Notice]:
             MANY_LEFT_OUT(
                 f"At {none} of {len(session.labels)} configurations every target was left out: "
                 f"{len(session.left_out)} of {session.planned} readings of targets are "
-                "missing. If the instrument does not see them there, plan for it: `truearm plan` with `device`.",
+                "missing. If the instrument does not see them there, plan for it: `truearm plan` with `device`."
             )
         )
     jumps = _out_of_order(session)
     if jumps:
         found.append(
-            OTHER_ORDER(
-                f"Not measured in the order of the plan: {_some(jumps)}. The file says in which order it was.",
-            )
+            OTHER_ORDER(f"Not measured in the order of the plan: {_some(jumps)}. The file says in which order it was.")
         )
     kept = [entry for entry in session.kept if entry.reading is not None]
     blind = sum(session.quality.unasked(entry.reading) for entry in kept if entry.reading is not None)
@@ -190,21 +164,19 @@ def session_notices(session: Session) -> list[Notice]:
         found.append(
             NOT_JUDGED(
                 f"Of {blind} of {len(kept)} readings that are kept nothing says how they were taken, or no limit was "
-                "given: scatter, settling and samples of the dwell were not judged.",
+                "given: scatter, settling and samples of the dwell were not judged."
             )
         )
     if session.missed_rounds:
         found.append(
             NESTS_MISSED(
                 f"In {session.missed_rounds} of {session.rounds} rounds not all nests were measured: what moved in "
-                f"between is not known as well.{_hidden(session)}",
+                f"between is not known as well.{_hidden(session)}"
             )
         )
     if readings and not session.nests:
         found.append(
-            NO_NESTS(
-                "No fixed nests were measured along the way: nobody can tell whether instrument or robot moved.",
-            )
+            NO_NESTS("No fixed nests were measured along the way: nobody can tell whether instrument or robot moved.")
         )
     return found
 

@@ -50,7 +50,7 @@ def extent_notices(session: Session, flange: Array) -> list[Notice]:
             return [
                 UNITS_UNLIKELY(
                     f"The readings of {name} at {len(kept)} configurations are {read * 1e3:.4g} mm apart, root mean "
-                    f"square about their middle, and the flange of the robot {driven * 1e3:.4g} mm.",
+                    f"square about their middle, and the flange of the robot {driven * 1e3:.4g} mm."
                 )
             ]
     return []

@@ -164,11 +164,7 @@ class About:
         """Name what nobody said."""
         if not self.missing:
             return []
-        return [
-            NOT_SAID(
-                f"Nobody said: {', '.join(self.missing)}.",
-            )
-        ]
+        return [NOT_SAID(f"Nobody said: {', '.join(self.missing)}.")]
 
 
 def _millimetres(length: float | None) -> str:

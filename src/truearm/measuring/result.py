@@ -27,12 +27,7 @@ PAGE: Final = "measure.html"
 GOES_ON: Final = "The same command goes on there."
 
 
-UNFINISHED: Final = Rule(
-    "unfinished",
-    "warning",
-    "readings are still to be taken",
-    gravity=2,
-)
+UNFINISHED: Final = Rule("unfinished", "warning", "readings are still to be taken", gravity=2)
 NESTS_MOVED: Final = Rule(
     "nests-moved",
     "warning",
@@ -166,7 +161,7 @@ class Measured(Record):
         return [
             UNFINISHED(
                 f"{counted(self.session.outstanding, 'reading')} are still to be taken; next is {step.label}, "
-                f"{step.names[0]}. {GOES_ON}",
+                f"{step.names[0]}. {GOES_ON}"
             )
         ]
 
@@ -181,7 +176,7 @@ class Measured(Record):
             NESTS_MOVED(
                 f"The nests moved together by up to {far * 1e3:.3f} mm, and by chance a coordinate of a reading is off "
                 f"by no more than {noise * 1e3:.4f} mm: instrument or floor moved. The readings are not corrected for "
-                "it.",
+                "it."
             )
         ]
 

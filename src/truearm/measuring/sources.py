@@ -87,21 +87,9 @@ class _Client:
     lines: int = 0
 
 
-WRONG_TOKENS: Final = Rule(
-    "wrong-tokens",
-    "warning",
-    "connections without the right token",
-)
-LINES_REFUSED: Final = Rule(
-    "lines-refused",
-    "warning",
-    "lines that could not be taken",
-)
-CUT_OFF: Final = Rule(
-    "cut-off",
-    "warning",
-    "connections that sent too much, or were too many",
-)
+WRONG_TOKENS: Final = Rule("wrong-tokens", "warning", "connections without the right token")
+LINES_REFUSED: Final = Rule("lines-refused", "warning", "lines that could not be taken")
+CUT_OFF: Final = Rule("cut-off", "warning", "connections that sent too much, or were too many")
 
 
 # Readings sent by a program of this machine, a line each, over TCP.
@@ -156,7 +144,7 @@ class Listener:
             found.append(
                 WRONG_TOKENS(
                     f"{counted(self._wrong_tokens, 'connection')} without the right token "
-                    f"{'was' if self._wrong_tokens == 1 else 'were'} refused.",
+                    f"{'was' if self._wrong_tokens == 1 else 'were'} refused."
                 )
             )
         if self._refused:
@@ -165,7 +153,7 @@ class Listener:
             found.append(
                 CUT_OFF(
                     f"{counted(self._cut_off, 'connection')} sent too much at once, or connected beside too many "
-                    "others, and was cut off.",
+                    "others, and was cut off."
                 )
             )
         return tuple(found)

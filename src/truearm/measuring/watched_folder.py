@@ -54,27 +54,11 @@ class _Counts:
     not_read: dict[str, str] = field(default_factory=dict)
 
 
-ROWS_BROKEN: Final = Rule(
-    "rows-broken",
-    "warning",
-    "rows that could not be read",
-)
-FILE_REPLACED: Final = Rule(
-    "file-replaced",
-    "warning",
-    "rows that were read are no longer in their file",
-)
-NOT_READ: Final = Rule(
-    "not-read",
-    "note",
-    "what is not read in the folder",
-    gravity=0,
-)
+ROWS_BROKEN: Final = Rule("rows-broken", "warning", "rows that could not be read")
+FILE_REPLACED: Final = Rule("file-replaced", "warning", "rows that were read are no longer in their file")
+NOT_READ: Final = Rule("not-read", "note", "what is not read in the folder", gravity=0)
 LINE_WITHOUT_END: Final = Rule(
-    "line-without-end",
-    "warning",
-    "the last line of a file has no line break, and is not read",
-    gravity=0,
+    "line-without-end", "warning", "the last line of a file has no line break, and is not read", gravity=0
 )
 
 
@@ -139,14 +123,14 @@ class WatchedFolder:
             more = f" and {rest} more" if rest > 0 else ""
             found.append(
                 ROWS_BROKEN(
-                    f"{counted(len(counts.broken), 'row')} could not be read: {' '.join(counts.broken[:_NAMED])}{more}",
+                    f"{counted(len(counts.broken), 'row')} could not be read: {' '.join(counts.broken[:_NAMED])}{more}"
                 )
             )
         if counts.replaced:
             found.append(
                 FILE_REPLACED(
                     f"{', '.join(dict.fromkeys(counts.replaced))}: rows that were read are no longer there, or have "
-                    "changed. What was read stays as it was; rows that differ count as new.",
+                    "changed. What was read stays as it was; rows that differ count as new."
                 )
             )
         if counts.not_read:
@@ -158,7 +142,7 @@ class WatchedFolder:
             found.append(
                 LINE_WITHOUT_END(
                     f"The last line of {', '.join(open_ends)} has no line break at its end and is not read: it may be "
-                    "half of a row.",
+                    "half of a row."
                 )
             )
         return tuple(found)

@@ -78,7 +78,7 @@ class PlannedPoses(Record):
         return (
             UNREACHABLE_POSES(
                 f"{counted(len(missed), 'pose')} of the set {self.made.name} cannot be reached within the joint limits "
-                f"and {'is' if len(missed) == 1 else 'are'} left out: {listed(missed)}.",
+                f"and {'is' if len(missed) == 1 else 'are'} left out: {listed(missed)}."
             ),
         )
 

@@ -68,16 +68,12 @@ def load_notices(robot: Robot) -> list[Notice]:
         return [
             RATING_UNKNOWN(
                 f"The flange carries {mass:g} kg, and the robot file does not say for how much {robot.name} is rated "
-                "(rated_load): see that it may carry that.",
+                "(rated_load): see that it may carry that."
             )
         ]
     if mass <= robot.rated_load:
         return []
-    return [
-        OVERLOAD(
-            f"The flange carries {mass:g} kg, and {robot.name} is rated for {robot.rated_load:g} kg.",
-        )
-    ]
+    return [OVERLOAD(f"The flange carries {mass:g} kg, and {robot.name} is rated for {robot.rated_load:g} kg.")]
 
 
 TOOL_ASSUMED: Final = Rule(
@@ -103,7 +99,7 @@ def targets_notices(robot: Robot, given: Robot, device: str = "") -> list[Notice
     return [
         TOOL_ASSUMED(
             "Nobody said the targets of the flange: what is measured, and kept clear, is assumed, "
-            f"{_taken(robot, given, device, weighed=True)}. State the targets in the robot file.",
+            f"{_taken(robot, given, device, weighed=True)}. State the targets in the robot file."
         )
     ]
 
@@ -300,7 +296,7 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str
             0,
             FASTER_THAN_ASKED(
                 f"{language.name} says no share below 1 %: {'' if speeds else 'where joints are as fast as any, '}"
-                f"a target goes at up to {shown_speed(fastest)} mm/s.",
+                f"a target goes at up to {shown_speed(fastest)} mm/s."
             ),
         )
     texts = dict(language.motion(program))

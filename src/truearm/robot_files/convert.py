@@ -36,11 +36,7 @@ if TYPE_CHECKING:
     from truearm.robot_files.jobs import ConvertRobot, ExportRobot, ExportToRobodk
 
 
-LEFT_OUT: Final = Rule(
-    "left-out",
-    "warning",
-    "what the robot file in the other convention cannot hold",
-)
+LEFT_OUT: Final = Rule("left-out", "warning", "what the robot file in the other convention cannot hold")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

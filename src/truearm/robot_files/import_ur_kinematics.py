@@ -72,13 +72,13 @@ class ImportedKinematics(Record):
                 TYPE_DOUBTFUL(
                     f"The file is rather of an arm of type {best}. The factory's joint zeros are nearly nothing, and "
                     f"they are up to {math.degrees(zero):.2g} deg for {best} and {math.degrees(ours):.2g} deg for "
-                    f"{self.type.name}.",
+                    f"{self.type.name}."
                 ),
             )
         return (
             TYPE_NOT_TOLD(
                 f"The file fits {' and '.join(self.fitting)} as well as {self.type.name}: it has differences to a "
-                "table that it does not name.",
+                "table that it does not name."
             ),
         )
 

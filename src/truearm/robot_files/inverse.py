@@ -213,9 +213,7 @@ def _near(asked: FindJoints, arm: Robot, joints_are: JointsOf, poses: int) -> Ar
 
 
 MODEL_FRAME: Final = Rule(
-    "model-frame",
-    "note",
-    "the poses were taken in the model's base frame, and the pendant shows them in another",
+    "model-frame", "note", "the poses were taken in the model's base frame, and the pendant shows them in another"
 )
 
 
@@ -228,7 +226,7 @@ def _other_frame(robot: Robot, frame: Frame, target: str | None) -> list[Notice]
     return [
         MODEL_FRAME(
             "The poses were taken as those of the model's flange in its base frame. The controller has them elsewhere "
-            "('truearm show' says where): for poses that the pendant shows use `frame=controller`.",
+            "('truearm show' says where): for poses that the pendant shows use `frame=controller`."
         )
     ]
 

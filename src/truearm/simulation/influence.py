@@ -388,9 +388,7 @@ def _identified(asked: FindInfluence, given: _Given, parts: _Parts) -> Identifie
 
 
 POSES_UNMET: Final = Rule(
-    "poses-unmet",
-    "warning",
-    "the parameters cannot meet these poses; their sets are where the steps ended",
+    "poses-unmet", "warning", "the parameters cannot meet these poses; their sets are where the steps ended"
 )
 INFLUENCE_WORSE: Final = Rule(
     "influence-worse",
@@ -408,7 +406,7 @@ def _compared(found: Identified) -> list[Notice]:
         told.append(
             POSES_UNMET(
                 f"{counted(unmet, 'pose')} of {len(found.by_influence.converged)} could not be met by these parameters:"
-                " their sets are where the steps ended.",
+                " their sets are where the steps ended."
             )
         )
     by_influence, at_once = (found.errors[way].position for way in ("influence", "least squares"))
@@ -417,17 +415,13 @@ def _compared(found: Identified) -> list[Notice]:
             INFLUENCE_WORSE(
                 f"Identification by influence leaves {by_influence.mean * 1e3:.3f} mm, least squares from all poses at "
                 f"once {at_once.mean * 1e3:.3f} mm: one pose sees three combinations of the parameters, and what it "
-                "does not see stays wrong.",
+                "does not see stays wrong."
             )
         )
     return told
 
 
-NO_INFLUENCE: Final = Rule(
-    "no-influence",
-    "note",
-    "these parameters do not change the pose of the tip anywhere",
-)
+NO_INFLUENCE: Final = Rule("no-influence", "note", "these parameters do not change the pose of the tip anywhere")
 
 
 def _still(made: Influence) -> list[Notice]:

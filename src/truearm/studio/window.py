@@ -40,11 +40,7 @@ REFUSED: Final = Rule(
     ("error", "warning"),
     "a job refused what it was given (error); a request from elsewhere was turned away (warning)",
 )
-CANCELLED: Final = Rule(
-    "cancelled",
-    "note",
-    "a long action was cancelled, and nothing was written",
-)
+CANCELLED: Final = Rule("cancelled", "note", "a long action was cancelled, and nothing was written")
 
 
 class Page(Protocol):

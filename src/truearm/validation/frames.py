@@ -132,7 +132,7 @@ def check_frames(robot: Robot, data: Dataset, errors: Errors, known: Moved | Non
         IMPLAUSIBLE(
             f"Half of the readings are off by more than {millimetres(float(np.median(off)))} mm, where the arm "
             f"reaches {reach * 1e3:.0f} mm (allowed: {LARGEST_SHARE_LEFT:g} of that): these are not readings of this "
-            "robot, or their units, joints or targets are mistaken. Look at them with 'truearm check'.",
+            "robot, or their units, joints or targets are mistaken. Look at them with 'truearm check'."
         )
     ]
 
@@ -326,8 +326,4 @@ def check_names(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
     if not meant:
         return []
     words = ", ".join(f"{name} is {other}" for name, other in meant.items())
-    return [
-        TARGETS_RENAMED(
-            f"The readings fit other targets of the robot better: {words}.",
-        )
-    ]
+    return [TARGETS_RENAMED(f"The readings fit other targets of the robot better: {words}.")]

@@ -346,7 +346,7 @@ def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[N
     return [
         TRAINING_DATA(
             f"The robot was calibrated with these readings: {count} of their {of} configurations are those it was "
-            f"trained on{held_out}. These errors flatter it. Validate with measurements that were not used.",
+            f"trained on{held_out}. These errors flatter it. Validate with measurements that were not used."
         )
     ]
 

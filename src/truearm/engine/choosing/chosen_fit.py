@@ -75,9 +75,7 @@ def identify_chosen(
 
 
 CHOSEN_IN_PART: Final = Rule(
-    "chosen-in-part",
-    "note",
-    "the data are large: `auto` chose the model by a part of the training configurations",
+    "chosen-in-part", "note", "the data are large: `auto` chose the model by a part of the training configurations"
 )
 
 
@@ -88,7 +86,7 @@ def check_part(compared: Dataset, data: Dataset) -> list[Notice]:
     return [
         CHOSEN_IN_PART(
             f"The data are large for so many effects: the model was chosen by {compared.configurations} of "
-            f"{counted(data.configurations, 'training configuration')}, evenly spaced, and fitted to all of them.",
+            f"{counted(data.configurations, 'training configuration')}, evenly spaced, and fitted to all of them."
         )
     ]
 
@@ -120,7 +118,7 @@ def check_choice(selection: Selection) -> list[Notice]:
         found.append(
             SMALLER_MODEL(
                 f"The model that was chosen first ({listed(effects) or 'geometric'}) ended in {status}, so a smaller "
-                "one was taken. More configurations, which move every joint, could bear it.",
+                "one was taken. More configurations, which move every joint, could bear it."
             )
         )
     ordered = [name for name in selection.model.effects if name in ORDERED]
@@ -129,7 +127,7 @@ def check_choice(selection: Selection) -> list[Notice]:
             ORDER_IN_THE_MODEL(
                 f"The model follows the order of this campaign ({listed(ordered)}). That cleans the other parameters. "
                 "Predictions whose place in an order is not known, of other sessions for example, are those of the "
-                "middle of this one.",
+                "middle of this one."
             )
         )
     if selection.lines:

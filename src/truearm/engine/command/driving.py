@@ -184,7 +184,7 @@ def replaced_notices(folder: Path, name: str, text: str) -> tuple[Notice, ...]:
             return (
                 PLAN_REPLACED(
                     f"Another plan stood in {folder / name}{again}, and was replaced. What was measured or programmed "
-                    "by that plan does not belong to this one. To keep both, write them to different places.",
+                    "by that plan does not belong to this one. To keep both, write them to different places."
                 ),
             )
     return ()

@@ -121,7 +121,7 @@ def excluded_notices(excluded: tuple[Excluded, ...]) -> list[Notice]:
     return [
         EXCLUDED(
             f"{counted(count, 'reading')} {'is' if count == 1 else 'are'} excluded: {reasons(excluded)}. Excluded "
-            f"readings count as missing. {_RULE}",
+            f"readings count as missing. {_RULE}"
         )
     ]
 
@@ -162,6 +162,6 @@ def check_excluded(
     return [
         HELD_OUT_EXCLUDED(
             f"{counted(count, 'reading')} of the held-out part {'is' if count == 1 else 'are'} excluded: "
-            f"{reasons(mine)}.{told} {_RULE}",
+            f"{reasons(mine)}.{told} {_RULE}"
         )
     ]

@@ -173,7 +173,7 @@ def check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[
                     *(cures if seen else []),
                     *(["Judge it at other joint positions with 'truearm validate'."] if again else []),
                 ]
-            ),
+            )
         )
     ]
 
@@ -208,7 +208,7 @@ def check_trained_before(
         TRAINING_DATA(
             f"The robot to begin with was calibrated with these readings already, on {count} of its {of} "
             f"configurations (seed {seed}): what is held out now was partly seen then, and the held-out errors "
-            "flatter it. Begin with the nominal robot, or with the same `train` and `seed`.",
+            "flatter it. Begin with the nominal robot, or with the same `train` and `seed`."
         )
     ]
 
@@ -225,7 +225,7 @@ NOTHING_HELD_OUT: Final = Rule(
 def nothing_held_out() -> Notice:
     """Say that there is no proof."""
     return NOTHING_HELD_OUT(
-        "Nothing was held out: the errors are those of the training readings and flatter the model.",
+        "Nothing was held out: the errors are those of the training readings and flatter the model."
     )
 
 
@@ -272,9 +272,7 @@ MAKER: Final = Rule(
 NOT_BETTER: Final = "not-better-here"
 #: Programs that compute with the numbers of targets that are corrected.
 NUMBERS_READ: Final = Rule(
-    "numbers-read",
-    "warning",
-    "the program computes with numbers of corrected targets, which was accepted",
+    "numbers-read", "warning", "the program computes with numbers of corrected targets, which was accepted"
 )
 #: Programs of which some targets cannot be corrected.
 SKIPPED: Final = "skipped"
@@ -343,7 +341,7 @@ def known_of(robot: Robot) -> list[Notice]:
         return [
             UNPROVEN(
                 "Nothing is known of how this robot was calibrated and of how well it is known, so the errors of its "
-                "targets cannot be predicted.",
+                "targets cannot be predicted."
             )
         ]
     return told_of(robot)
@@ -367,7 +365,7 @@ def changed_since(robot: object) -> list[Notice]:
     return [
         CHANGED_SINCE_WRITTEN(
             f"{Path(robot).name} was changed or exchanged after it was written together with {', '.join(others)}: "
-            "what they say is not about it.",
+            "what they say is not about it."
         )
     ]
 
@@ -396,7 +394,7 @@ def _edited(robot: Robot) -> list[Notice]:
     return [
         EDITED_BY_HAND(
             "The values of this robot were changed after its calibration, so what is known of its accuracy is not "
-            "about them: the errors of targets cannot be predicted.",
+            "about them: the errors of targets cannot be predicted."
         )
     ]
 

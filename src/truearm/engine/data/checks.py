@@ -113,11 +113,7 @@ def _closer_together(data: Dataset) -> list[Notice]:
     return found
 
 
-TEMPERATURE_UNLIKELY: Final = Rule(
-    "temperature-unlikely",
-    "warning",
-    "temperatures below -30 or above 80 degC",
-)
+TEMPERATURE_UNLIKELY: Final = Rule("temperature-unlikely", "warning", "temperatures below -30 or above 80 degC")
 
 
 def _temperatures(data: Dataset) -> list[Notice]:
@@ -130,7 +126,7 @@ def _temperatures(data: Dataset) -> list[Notice]:
     return [
         TEMPERATURE_UNLIKELY(
             f"The temperature goes from {low:g} to {high:g} degC; arms work between {_COLDEST:g} and {_WARMEST:g}. "
-            "Is it in kelvin or degrees Fahrenheit?",
+            "Is it in kelvin or degrees Fahrenheit?"
         )
     ]
 
@@ -266,9 +262,7 @@ def _places(points: Array) -> tuple[Array, Array, float]:
 
 
 REFERENCE_MOVED: Final = Rule(
-    "reference-moved",
-    "warning",
-    "reference points beside the robot that moved by more than 0.1 mm",
+    "reference-moved", "warning", "reference points beside the robot that moved by more than 0.1 mm"
 )
 
 
@@ -321,12 +315,7 @@ def check_joints(robot: Robot, data: Dataset | Inclinations) -> None:
 # -- bookkeeping -------------------------------------------------------------------------------------------
 
 
-MISSING: Final = Rule(
-    "missing",
-    "warning",
-    "empty readings",
-    gravity=0,
-)
+MISSING: Final = Rule("missing", "warning", "empty readings", gravity=0)
 
 
 def _missing(data: Dataset, excluded: Mapping[str, int]) -> list[Notice]:
@@ -404,7 +393,7 @@ def _misnamed(data: Dataset) -> list[Notice]:
     return [
         TARGET_MISSPELT(
             f"Names look misspelt: {'; '.join(found[:_MOST_NAMED])}. A misspelt name is a target of its own. "
-            "Correct the names.",
+            "Correct the names."
         )
     ]
 

@@ -20,12 +20,7 @@ _SAME_ANGLE: Final = math.radians(0.01)
 _SAME_LENGTH: Final = 1e-5
 
 
-DUPLICATES: Final = Rule(
-    "duplicates",
-    "warning",
-    "readings that repeat another one to the last digit",
-    gravity=2,
-)
+DUPLICATES: Final = Rule("duplicates", "warning", "readings that repeat another one to the last digit", gravity=2)
 
 
 def check_duplicates(data: Dataset) -> list[Notice]:

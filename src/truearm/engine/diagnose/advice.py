@@ -26,15 +26,9 @@ _LEAST_INFORMED: Final = 0.5
 _LARGEST_UNINFORMED_SHARE: Final = 0.05
 
 
-NOT_CONVERGED: Final = Rule(
-    "not-converged",
-    "error",
-    "the solver's steps did not become small",
-)
+NOT_CONVERGED: Final = Rule("not-converged", "error", "the solver's steps did not become small")
 RANK_LOSS: Final = Rule(
-    "rank-loss",
-    "error",
-    "the training data do not determine some parameters, and predictions elsewhere depend on them",
+    "rank-loss", "error", "the training data do not determine some parameters, and predictions elsewhere depend on them"
 )
 CLOSED_LOOP: Final = Rule(
     "closed-loop",
@@ -42,11 +36,7 @@ CLOSED_LOOP: Final = Rule(
     "nothing says where the robot stands ([instruments](devices.md)): the unobservable parameters, and how accurate "
     "predicted positions are; where no length was measured, also without errors of the scale",
 )
-AT_BOUND: Final = Rule(
-    "at-bound",
-    "warning",
-    "parameters ended at a bound, by name",
-)
+AT_BOUND: Final = Rule("at-bound", "warning", "parameters ended at a bound, by name")
 REDUNDANT: Final = Rule(
     "redundant",
     "note",
@@ -58,11 +48,7 @@ RESIDUALS_EXCEED_SIGMA: Final = Rule(
     "the robot does more than the model, or sigma is too small",
     unless=frozenset({PULLED_AWAY}),
 )
-URDF_PARTIAL: Final = Rule(
-    "urdf-partial",
-    "note",
-    "what the URDF could not hold",
-)
+URDF_PARTIAL: Final = Rule("urdf-partial", "note", "what the URDF could not hold")
 
 
 def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
@@ -78,7 +64,7 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
         notices.append(
             RANK_LOSS(
                 f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend "
-                f"on them. {Status.RANK_LOSS.advice}",
+                f"on them. {Status.RANK_LOSS.advice}"
             )
         )
     if fit.gauge_freedoms:
@@ -108,7 +94,7 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
         notices.append(
             REDUNDANT(
                 f"Redundant parameters are held at their nominal values: {combinations}. The readings hardly observe "
-                f"the combinations in brackets.{alike}",
+                f"the combinations in brackets.{alike}"
             )
         )
     shared = fit.joint_error.any() and not fit.scattered
@@ -118,7 +104,7 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
                 f"The residuals are {fit.excess:.1f} times what the declared deviations"
                 f"{', and errors of the joints that readings of a configuration share,' if shared else ''} allow. "
                 f"Either the robot does something that the {fit.model.name} model cannot express, or sigma is too "
-                "small, or readings are wrong. The deviations of the parameters allow for it.",
+                "small, or readings are wrong. The deviations of the parameters allow for it."
             )
         )
     notices += _check_effects(fit)
@@ -129,16 +115,14 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
             URDF_PARTIAL(
                 f"calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold {effects} "
                 f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
-                "and the targets in the instrument's frame. calibrated.yaml holds everything.",
+                "and the targets in the instrument's frame. calibrated.yaml holds everything."
             )
         )
     return notices
 
 
 PARALLEL_AXES: Final = Rule(
-    "parallel-axes",
-    "warning",
-    "the convention cannot tilt parallel axes: give `beta`, or convert an S-model",
+    "parallel-axes", "warning", "the convention cannot tilt parallel axes: give `beta`, or convert an S-model"
 )
 
 
@@ -160,7 +144,7 @@ def _parallel_axes(fit: Fit) -> list[Notice]:
     return [
         PARALLEL_AXES(
             f"Joints {names} are parallel. The model has no beta that lets them tilt against each other, so it "
-            f"cannot follow the real robot. {cure}",
+            f"cannot follow the real robot. {cure}"
         )
     ]
 
@@ -190,7 +174,7 @@ def check_far_from_nominal(fit: Fit) -> list[Notice]:
     return [
         FAR_FROM_NOMINAL(
             f"{listed(far)} moved by more than {_LARGEST_MOVE:g} standard deviations of "
-            f"{'its prior' if len(far) == 1 else 'their priors'}. A robot that was never mastered well is so far off.",
+            f"{'its prior' if len(far) == 1 else 'their priors'}. A robot that was never mastered well is so far off."
         )
     ]
 
@@ -215,9 +199,7 @@ BEARING_ASSUMED: Final = Rule(
     gravity=0,
 )
 TOO_MANY_EFFECTS: Final = Rule(
-    "too-many-effects",
-    "warning",
-    "the data inform too many parameters of joint effects by less than half",
+    "too-many-effects", "warning", "the data inform too many parameters of joint effects by less than half"
 )
 NEGATIVE_EFFECT: Final = Rule(
     "negative-effect",
@@ -225,10 +207,7 @@ NEGATIVE_EFFECT: Final = Rule(
     "a compliance, a backlash or a clearance came out negative: masses, payload or gravity may be wrong",
 )
 EFFECTS_UNINFORMED: Final = Rule(
-    "effects-uninformed",
-    "warning",
-    "parameters of joint effects that the data do not inform, by name",
-    gravity=0,
+    "effects-uninformed", "warning", "parameters of joint effects that the data do not inform, by name", gravity=0
 )
 
 
@@ -247,7 +226,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         found.append(
             EFFECTS_IDLE(
                 f"The robot file has the joint effects {', '.join(idle)} with all values zero, and the model "
-                f"{fit.model.name} does not free them. Add `effects={idle[0]}`, or take them out of the file.",
+                f"{fit.model.name} does not free them. Add `effects={idle[0]}`, or take them out of the file."
             )
         )
     # What is expected of curves follows from the data: most of their many coefficients are meant to stay near zero.
@@ -258,7 +237,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
     if any(effect.loaded for effect in robot.effects) and not has_weight(robot):
         found.append(
             NO_LOADS(
-                "The robot has no link masses and no payload, so nothing loads its joints. Compliance cannot be found.",
+                "The robot has no link masses and no payload, so nothing loads its joints. Compliance cannot be found."
             )
         )
     elif unknown:
@@ -266,7 +245,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
             EFFECTS_UNINFORMED(
                 f"The data say nothing about {', '.join(unknown)}. Either nothing loads these joints that way (gravity "
                 "does not turn a vertical axis), or there are too few configurations for so many effects. The values "
-                "stay near zero.",
+                "stay near zero."
             )
         )
     tilting = {p.name for effect in robot.effects if effect.tilts for p in effect.parameters}
@@ -280,7 +259,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
             BEARING_ASSUMED(
                 f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are "
                 "taken at the joints' origins, and so are the moments that tilt them. If drawings tell, enter "
-                "the entry bearing of these joints in the robot file.",
+                "the entry bearing of these joints in the robot file."
             )
         )
     vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _LEAST_INFORMED]
@@ -289,7 +268,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
             TOO_MANY_EFFECTS(
                 f"Of {len(own)} parameters of joint effects, {len(vague)} rest more on their priors than on the data: "
                 f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}. There are too few configurations "
-                f"for so many effects. Measure more{'' if fit.model.tried else ', or let `model=auto` choose'}.",
+                f"for so many effects. Measure more{'' if fit.model.tried else ', or let `model=auto` choose'}."
             )
         )
     soft = _negative(fit)
@@ -297,7 +276,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         found.append(
             NEGATIVE_EFFECT(
                 f"{', '.join(soft)} came out negative, as no spring and no play is: masses, payload or gravity may be "
-                "wrong, or the parameter stands for something else that the model lacks.",
+                "wrong, or the parameter stands for something else that the model lacks."
             )
         )
     return found

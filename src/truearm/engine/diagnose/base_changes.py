@@ -191,9 +191,7 @@ def _moved(data: Dataset, part: NDArray[np.intp], motions: Sequence[Motion]) -> 
 
 
 BASE_CHANGED: Final = Rule(
-    "base-changed",
-    "note",
-    "readings were moved into the frame of the first base (`base_changes`)",
+    "base-changed", "note", "readings were moved into the frame of the first base (`base_changes`)"
 )
 
 
@@ -209,5 +207,5 @@ def _told(before: Dataset, after: Dataset, part: NDArray[np.intp]) -> Notice:
     return BASE_CHANGED(
         f"Readings were moved into the frame of the first base: {', '.join(words)} (root mean square). The motion was "
         "found along with the model from the training configurations and counts as known: no deviation contains what "
-        "is not known of it.",
+        "is not known of it."
     )

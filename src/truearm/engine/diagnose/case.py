@@ -28,11 +28,11 @@ from truearm.engine.diagnose.wrong_robot import (
 )
 from truearm.engine.fit.fit import Fit, Status
 
-#: The same, and single readings that are far off: what is left is not the robot's.
+#: Readings that pull a fit, and single ones that are far off: what is left is not the robot's.
 _DOUBTING: Final = PULLING | {OUTLIERS.code}
 #: Readings under the name of another point. A fit that they pull must not be used, and their names can be put right.
 _MISNAMED: Final = frozenset({TARGETS_SWAPPED.code, TARGET_MISTAKEN.code})
-#: Readings that pull a fit, whatever is wrong with them.
+#: All readings that may pull a fit, whatever is wrong with them.
 DOUBTED: Final = _DOUBTING | _MISNAMED | {JOINTS_REPEATED.code}
 #: Losses with which a fit is pulled.
 PULLED: Final = frozenset({"linear", "huber"})

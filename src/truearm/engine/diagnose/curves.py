@@ -72,10 +72,7 @@ CURVE_LEFT_OUT: Final = Rule(
     "joints for which the data show no [curve](joint-curves.md), or that turned too little to tell one from geometry",
 )
 CURVES_AND_FOURIER: Final = Rule(
-    "curves-and-fourier",
-    "note",
-    "a model with `joint-curve` and `fourier`, which curves contain",
-    gravity=0,
+    "curves-and-fourier", "note", "a model with `joint-curve` and `fourier`, which curves contain", gravity=0
 )
 CURVE_RANGE: Final = Rule(
     "curve-range",
@@ -114,14 +111,14 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
         found.append(
             CURVE_LEFT_OUT(
                 f"Joints without a curve (in brackets how far each turned): {sentence}. More configurations, through "
-                "more of the turn, may show one.",
+                "more of the turn, may show one."
             )
         )
     if Fourier.name in fit.model.effects:
         found.append(
             CURVES_AND_FOURIER(
                 "The model has curves of the joints and the effect fourier, whose one and two periods a turn curves "
-                "contain. The readings do not tell the two apart: leave fourier out.",
+                "contain. The readings do not tell the two apart: leave fourier out."
             )
         )
     if partly:
@@ -129,7 +126,7 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
             CURVE_RANGE(
                 f"Curves of joints are known where these were measured: {'; '.join(partly)}. Outside they are what "
                 "was found there, continued. The expected error over the workspace contains what that may be off by, "
-                "as far as other joints and ordinary encoders tell.",
+                "as far as other joints and ordinary encoders tell."
             )
         )
     return found
@@ -165,7 +162,7 @@ def check_curves_of_loads(left: LeftOver) -> list[Notice]:
     return [
         CURVES_OF_LOADS(
             f"Joints that give way under their loads would do {share:.0%} of what the curves of the joints do, with "
-            "one number a joint. The curves are then right for this payload and mounting only.",
+            "one number a joint. The curves are then right for this payload and mounting only."
         )
     ]
 
@@ -242,7 +239,7 @@ def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
         OUTLIERS_ONE_SIDED(
             f"{int(held.sum())} readings at {len(count)} configurations are held back as outliers, and they lie to one "
             f"side: by ({shift}) mm in the instrument's axes, in the median. Outliers to one side pull the fit along, "
-            "and the deviations of the parameters do not contain that bias.",
+            "and the deviations of the parameters do not contain that bias."
         )
     ]
 

@@ -72,14 +72,12 @@ def _too_seldom(data: Dataset) -> Notice:
     return NOT_COMPARED(
         f"{counted(len(data.targets), 'target')} of {counted(data.configurations, 'configuration')} were not compared "
         "with the robot: none was read at four configurations or more, so that nothing is said of the robot. Does "
-        "every reading have a name of its own?",
+        "every reading have a name of its own?"
     )
 
 
 COMPARED_IN_PART: Final = Rule(
-    "compared-in-part",
-    "note",
-    "the data are large, and a part of them was compared with the robot",
+    "compared-in-part", "note", "the data are large, and a part of them was compared with the robot"
 )
 
 
@@ -87,5 +85,5 @@ def _in_part(part: Dataset, data: Dataset) -> Notice:
     return COMPARED_IN_PART(
         f"The data are large: {part.configurations} of {counted(data.configurations, 'configuration')} and "
         f"{len(part.targets)} of {counted(len(data.targets), 'target')} were compared with the robot, evenly spaced "
-        "and read most often. What is far off elsewhere was not looked for.",
+        "and read most often. What is far off elsewhere was not looked for."
     )

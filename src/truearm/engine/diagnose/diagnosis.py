@@ -68,7 +68,7 @@ def check_residual(left: LeftOver) -> list[Notice]:
             "to less than 0.01 deg. No deviation is declared, so all of that counts as noise and errors of the joints. "
             f"Look for what the {fit.model.name} model lacks{more}, for joint positions that were rounded "
             "or taken before the arm stood still, for an instrument or a base that moved, and for readings of another "
-            "robot. If the instrument is no better, declare its deviation as sigma.",
+            "robot. If the instrument is no better, declare its deviation as sigma."
         )
     ]
 
@@ -141,6 +141,6 @@ def _in_part(left: LeftOver) -> list[Notice]:
         JUDGED_IN_PART(
             f"The data are large for so many parameters: what the fit leaves was looked at in {len(left.chosen)} of "
             f"{counted(left.given.configurations, 'configuration')}, evenly spaced. What is off or changed at others "
-            "alone is not told. Parameters and errors are those of all configurations.",
+            "alone is not told. Parameters and errors are those of all configurations."
         )
     ]

@@ -43,9 +43,7 @@ UNIT_ANGLE: Final = Rule(
     "some](check.md#wrong-joint-positions)",
 )
 MIRRORED: Final = Rule(
-    "mirrored",
-    "error",
-    "positions that fit their mirror image: two columns exchanged, or a wrong sign",
+    "mirrored", "error", "positions that fit their mirror image: two columns exchanged, or a wrong sign"
 )
 JOINTS_OF_CONTROLLER: Final = Rule(
     "joints-of-controller",
@@ -54,20 +52,14 @@ JOINTS_OF_CONTROLLER: Final = Rule(
     "and came as the model's",
 )
 JOINTS_OF_MODEL: Final = Rule(
-    "joints-of-model",
-    "error",
-    "joint positions that fit as the model's, and came as what the controller shows",
+    "joints-of-model", "error", "joint positions that fit as the model's, and came as what the controller shows"
 )
 JOINT_SIGN: Final = Rule(
     "joint-sign",
     "error",
     "joint positions that fit with the opposite sign of up to three joints, or with two columns exchanged",
 )
-ROWS_SHIFTED: Final = Rule(
-    "rows-shifted",
-    "error",
-    "joint positions that fit one row earlier or later",
-)
+ROWS_SHIFTED: Final = Rule("rows-shifted", "error", "joint positions that fit one row earlier or later")
 
 
 @dataclass(frozen=True, eq=False)
@@ -426,7 +418,7 @@ def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]
     return [
         ORIENTATION_ORDER(
             "The orientations do not turn as the robot does, and would if their three numbers were read otherwise: "
-            f"{_first_of(told)}.",
+            f"{_first_of(told)}."
         )
     ]
 

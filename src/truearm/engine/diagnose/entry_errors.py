@@ -378,9 +378,7 @@ def _shares(robot: Robot, entries: Sequence[EntryError]) -> list[float]:
 
 
 FIXTURES_UNLIKELY: Final = Rule(
-    "fixtures-unlikely",
-    ("error", "warning"),
-    "[fixtures](devices.md) that the readings do not fit",
+    "fixtures-unlikely", ("error", "warning"), "[fixtures](devices.md) that the readings do not fit"
 )
 
 
@@ -478,7 +476,7 @@ def _beyond_reach(robot: Robot, data: Dataset) -> list[Notice]:
         UNIT_LENGTH(
             f"The positions lie up to {_apart(data):.3g} m from the middle of all, where the arm reaches "
             f"{_reach(robot, data):.2g} m. No one unit makes them fit: some of their numbers are in another unit or "
-            "lost their decimal point or comma, or more is wrong with the data than that.",
+            "lost their decimal point or comma, or more is wrong with the data than that."
         )
     ]
 
@@ -520,7 +518,7 @@ def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
         return [
             ROWS_UNRELATED(
                 "The readings do not follow the joint positions: in an order drawn at random they fit the robot as "
-                "well.",
+                "well."
             )
         ]
     return []

@@ -45,7 +45,7 @@ def check_payload(robot: Robot) -> list[Notice]:
     return [
         PAYLOAD_UNLIKELY(
             f"The payload is {mass:.4g} kg, and {robot.name} reaches {reach:.2g} m: no arm of that size carries more "
-            f"than {_MOST * reach**3:.2g} kg. Were grams called kilograms? What loads the joints follows from it.",
+            f"than {_MOST * reach**3:.2g} kg. Were grams called kilograms? What loads the joints follows from it."
         )
     ]
 
@@ -75,11 +75,7 @@ class _Bending:
     rigid: bool  #: Whether no joint gives way although the force loads some.
 
 
-FORCE_TAKEN: Final = Rule(
-    "force-taken",
-    "note",
-    "how far the force moves the tip at most, and how well that is known",
-)
+FORCE_TAKEN: Final = Rule("force-taken", "note", "how far the force moves the tip at most, and how well that is known")
 FORCE_ON_RIGID_MODEL: Final = Rule(
     "force-on-rigid-model",
     "warning",
@@ -111,7 +107,7 @@ def check_force(cases: Sequence[tuple[Robot, Array | Postures]]) -> list[Notice]
         return [
             FORCE_ON_RIGID_MODEL(
                 "The model has no joints that give way, so the force at the tool changes nothing in it, and the real "
-                "arm bends.",
+                "arm bends."
             ),
             *made,
         ]
@@ -227,7 +223,7 @@ def _unseen(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
     return [
         COMPLIANCE_UNSEEN(
             f"The force leans on what the calibration's data did not determine: {words}{more}; so uncertain is the tip "
-            f"by it (standard deviation).{on_joints} Gravity does not load a joint whose axis is upright.",
+            f"by it (standard deviation).{on_joints} Gravity does not load a joint whose axis is upright."
         )
     ]
 
@@ -258,7 +254,7 @@ def _beyond(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
     return [
         LOADS_BEYOND_DATA(
             f"The force loads joints beyond what they carried while they were measured: {words}. That they give way in "
-            "proportion up to there is assumed.",
+            "proportion up to there is assumed."
         )
     ]
 
@@ -284,15 +280,13 @@ def _turned(arms: Sequence[Robot]) -> list[Notice]:
         FORCE_IN_MODEL_BASE(
             "The force was taken in the axes of the model's base frame, and the base of the controller is turned "
             "against it ('truearm show' says how): for a force in the axes of the pendant use "
-            "`wrench_frame=controller`.",
+            "`wrench_frame=controller`."
         )
     ]
 
 
 RATED_LOAD_EXCEEDED: Final = Rule(
-    "rated-load-exceeded",
-    "warning",
-    "payload and force together are more than the rated load",
+    "rated-load-exceeded", "warning", "payload and force together are more than the rated load"
 )
 RATING_UNKNOWN: Final = Rule(
     "rating-unknown",
@@ -312,7 +306,7 @@ def _rated(arms: Sequence[Robot]) -> list[Notice]:
         return [
             RATING_UNKNOWN(
                 "The robot file does not say what the arm is rated for (rated_load), so nothing tells whether it may "
-                "be pushed so.",
+                "be pushed so."
             )
         ]
     sizes = [
@@ -324,6 +318,6 @@ def _rated(arms: Sequence[Robot]) -> list[Notice]:
     return [
         RATED_LOAD_EXCEEDED(
             f"Payload and force together make up to {max(sizes):.3g} N, and {robot.name} is rated for {weight:.3g} N "
-            f"({robot.rated_load:g} kg). Makers count the forces of a process to the load.",
+            f"({robot.rated_load:g} kg). Makers count the forces of a process to the load."
         )
     ]

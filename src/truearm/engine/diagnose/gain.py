@@ -69,7 +69,7 @@ def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = 
         return [
             FEW_HELD_OUT(
                 f"Only {postures} with readings {'is' if len(new) == 1 else 'are'} held out: whether the calibrated "
-                f"robot is better than the nominal one is not known. {_FEWEST} or more can tell.",
+                f"robot is better than the nominal one is not known. {_FEWEST} or more can tell."
             )
         ]
     figures = (
@@ -90,7 +90,7 @@ def check_gain(before: Errors, after: Errors, data: Dataset, *, doubted: bool = 
     return [
         NO_GAIN(
             f"{figures} That is no significant gain (signed-rank test in pairs, 1 %). The nominal robot is accurate "
-            "already, or there are too few readings for this model, or something is wrong with them.",
+            "already, or there are too few readings for this model, or something is wrong with them."
         )
     ]
 

@@ -133,7 +133,7 @@ def _strained(fit: Fit, found: Fit) -> list[Notice]:
     return [
         HOLD_STRAINED(
             f"With the places held, {listed(strained)} went far from nominal, and with all of them found not. That is "
-            "what an error of the held numbers does which the readings cannot show.",
+            "what an error of the held numbers does which the readings cannot show."
         )
     ]
 

@@ -102,7 +102,7 @@ def check_few_to_doubt(fit: Fit) -> list[Notice]:
         FEW_READINGS(
             f"The readings are {counted(fit.numbers, 'number')}, for {counted(parameters, 'parameter')} of the "
             f"{fit.model.name} model. With fewer than {_FEWEST_TO_DOUBT:g} for each, a wrong reading cannot be told "
-            f"from a right one. {CURE}",
+            f"from a right one. {CURE}"
         )
     ]
 
@@ -237,7 +237,7 @@ def _beyond_curves(fit: Fit, expected: ExpectedError, measured: Dataset, known: 
             f"Over the workspace the targets are expected to be off by {_mm(mean)} mm on average (90 %: {_mm(low)} to "
             f"{_mm(high)}), at configurations like those measured by {_mm(there)} mm, both without the noise of a "
             "reading: curves of joints are known only where these were measured. Measure configurations in which these "
-            f"joints move further: {'; '.join(few)}.",
+            f"joints move further: {'; '.join(few)}."
         )
     ]
 

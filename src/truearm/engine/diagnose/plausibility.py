@@ -184,7 +184,7 @@ def check_rounding(fit: Fit, data: Dataset) -> list[Notice]:
     return [
         JOINTS_ROUNDED(
             f"The joint positions are multiples of {step:g} {unit}, and the joints seem to err by "
-            f"{math.degrees(seeming):.2g} deg, where rounding to that step makes {math.degrees(by_rounding):.2g} deg.",
+            f"{math.degrees(seeming):.2g} deg, where rounding to that step makes {math.degrees(by_rounding):.2g} deg."
         )
     ]
 
@@ -297,7 +297,7 @@ def _computed(robot: Robot, data: Dataset, off: Array) -> list[Notice]:
     return [
         POSITIONS_COMPUTED(
             f"{robot.name} misses the readings by {spread.rms * 1e3:.2g} mm before any calibration (root mean square). "
-            "No real arm and no instrument is as good: a controller computes such positions from its joints.",
+            "No real arm and no instrument is as good: a controller computes such positions from its joints."
         )
     ]
 
@@ -376,11 +376,7 @@ def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
                 found.append(f"{block.target}{beside} by {off * sigma * 1e3:.3g} mm, {off:.0f} times its deviation")
     if not found:
         return []
-    return [
-        FIXTURE_MISPLACED(
-            f"Fixtures are not where, or not as far apart, as the file says: {', '.join(found)}.",
-        )
-    ]
+    return [FIXTURE_MISPLACED(f"Fixtures are not where, or not as far apart, as the file says: {', '.join(found)}.")]
 
 
 def _one_point(fit: Fit, data: Dataset) -> list[Notice]:
@@ -400,7 +396,7 @@ def _one_point(fit: Fit, data: Dataset) -> list[Notice]:
     return [
         TARGET_MISSPELT(
             f"Targets with like names are the same point on the flange: {'; '.join(found)}. If one name is misspelt, "
-            "correct it: a misspelt name is a target of its own.",
+            "correct it: a misspelt name is a target of its own."
         )
     ]
 

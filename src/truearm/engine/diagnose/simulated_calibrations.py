@@ -279,7 +279,7 @@ def check_linear(fit: Fit, found: SimulatedCalibrations) -> list[Notice]:
         told.append(
             TRIALS_LOST(
                 f"{lost} of {found.asked} simulated calibrations did not converge, and the intervals by Monte Carlo "
-                "are of the rest: the data hardly determine this model.",
+                "are of the rest: the data hardly determine this model."
             )
         )
     if found.settled < 2:
@@ -296,7 +296,7 @@ def check_linear(fit: Fit, found: SimulatedCalibrations) -> list[Notice]:
         told.append(
             INTERVALS_TOO_NARROW(
                 f"By Monte Carlo the deviations of {listed(wider)} are up to {ratio[wider[0]]:.2g} times the linear "
-                "ones: the model bends too much for these.",
+                "ones: the model bends too much for these."
             )
         )
     return told

@@ -209,9 +209,7 @@ def _last_moves(data: Dataset, number: Array) -> Array:
 
 
 JOINTS_NOT_SETTLED: Final = Rule(
-    "joints-not-settled",
-    "warning",
-    "residuals that depend on the direction from which each joint arrived",
+    "joints-not-settled", "warning", "residuals that depend on the direction from which each joint arrived"
 )
 
 
@@ -227,7 +225,7 @@ def check_approach_lag(left_over: LeftOver) -> list[Notice]:
             f"The direction from which each joint arrived explains {found.share:.0%} of the residuals. The true joint "
             f"positions differ from the recorded ones by {shown}, times the sign of the last move. Either the joints "
             "were read before the robot had settled: use the commanded joints, or read later. Or the joints have "
-            "hysteresis: arrive from one side only.",
+            "hysteresis: arrive from one side only."
         )
     ]
 
@@ -275,7 +273,7 @@ def check_separate_visits(left: LeftOver) -> list[Notice]:
         SEPARATE_VISITS(
             "The readings of a configuration err as joints err, but each by itself, where readings of one visit "
             "share the errors of the joints. So the targets were read on separate visits: the robot left and came back "
-            "between them.",
+            "between them."
         )
     ]
 
@@ -362,7 +360,7 @@ def check_sigma(left: LeftOver) -> list[Notice]:
     return [
         SIGMA_TOO_LARGE(
             f"{words}. The deviations of the parameters are too large by about as much. Fix sigma or its unit, or "
-            "leave it out: the noise is then estimated.",
+            "leave it out: the noise is then estimated."
         )
     ]
 
@@ -390,7 +388,7 @@ def check_sigma_beside_joints(left: LeftOver) -> list[Notice]:
             f"beside errors of the joints. So the fit takes errors of the joints for noise: it finds {part} of them, "
             "and the expected error and the intervals may be too small. Declare one standard deviation "
             "of a coordinate, not a maximum permissible error or two deviations; or leave sigma out: the noise is then "
-            "estimated.",
+            "estimated."
         )
     ]
 

@@ -128,9 +128,7 @@ def _geometry_moved(fit: Fit, data: Dataset) -> float:
 
 
 IMPLAUSIBLE: Final = Rule(
-    "implausible",
-    "error",
-    "a robust fit that [cannot be this robot](results.md#status-and-warnings)",
+    "implausible", "error", "a robust fit that [cannot be this robot](results.md#status-and-warnings)"
 )
 
 
@@ -370,8 +368,7 @@ def other_robot(robot: Robot, data: Dataset) -> list[Notice]:
         return []
     return [
         WRONG_ROBOT(
-            f"The readings are not of {robot.name}.{better.text} Take the file of the robot that was measured.",
-            "error",
+            f"The readings are not of {robot.name}.{better.text} Take the file of the robot that was measured.", "error"
         )
     ]
 

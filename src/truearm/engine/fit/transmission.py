@@ -196,11 +196,7 @@ def _agreement(angle: Array, pull: Array) -> float:
     return float(total @ np.linalg.lstsq(waves @ waves.T, total, rcond=1e-10)[0])
 
 
-TRANSMISSION_ERROR: Final = Rule(
-    "transmission-error",
-    "warning",
-    "residuals repeat with a joint's angle",
-)
+TRANSMISSION_ERROR: Final = Rule("transmission-error", "warning", "residuals repeat with a joint's angle")
 
 
 def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
@@ -213,6 +209,6 @@ def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
         TRANSMISSION_ERROR(
             f"What is left over repeats with the joints' angles: {told}. Strain wave gears do that, twice in a turn "
             "of their wave generator. `model=auto` tries to take the error out; any other model does with the effect "
-            "transmission-error, and transmission_periods of these joints in the robot file.",
+            "transmission-error, and transmission_periods of these joints in the robot file."
         )
     ]

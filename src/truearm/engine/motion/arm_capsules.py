@@ -122,7 +122,7 @@ def beside_notices(robot: Robot) -> list[Notice]:
                 f"The axes of joints {numbers} are parallel, and no model says where along them the links are. The arm "
                 f"keeps clear wherever they lie from {low} to {high} mm along the axis of joint {group.joints[0]} "
                 "from where the model has it. If a drawing has a link farther out, state a `clearance` larger "
-                "by that.",
+                "by that."
             )
         )
     return notices

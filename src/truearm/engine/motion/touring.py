@@ -71,9 +71,7 @@ _SAME: Final = 1e-6
 
 
 NEVER_APART: Final = Rule(
-    "never-apart",
-    "note",
-    "what no posture keeps apart by the clearance, and so is not looked at",
+    "never-apart", "note", "what no posture keeps apart by the clearance, and so is not looked at"
 )
 
 
@@ -84,7 +82,7 @@ def cell_notices(check: CollisionCheck) -> tuple[Notice, ...]:
         notices.append(
             NEVER_APART(
                 "Nearer to each other than the clearance whatever the joints do, and so not kept apart: "
-                f"{'; '.join(check.left_out)}.",
+                f"{'; '.join(check.left_out)}."
             )
         )
     return tuple(notices)
@@ -136,7 +134,7 @@ def _frame_notices(check: CollisionCheck) -> list[Notice]:
     return [
         OTHER_BASE_ON_PENDANT(
             f"{named[0].upper()}{named[1:]} {kept} kept in the base frame of the robot file. The pendant shows "
-            f"positions in another one, with its origin at ({at}) mm in it{also}: add that to what it shows.",
+            f"positions in another one, with its origin at ({at}) mm in it{also}: add that to what it shows."
         )
     ]
 
@@ -164,16 +162,12 @@ def _box_notices(check: CollisionCheck) -> list[Notice]:
         longest = float((box.high - box.low).max())
         away = float(np.linalg.norm(np.clip(0.0, box.low, box.high)))
         if longest < _TINY:
-            notices.append(
-                BOX_TINY(
-                    f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm.",
-                )
-            )
+            notices.append(BOX_TINY(f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm."))
         elif away - reach > check.need:
             notices.append(
                 BOX_OUT_OF_REACH(
                     f"The box '{box.name}' begins {away * 1e3:.0f} mm from the base, and the arm reaches at most "
-                    f"{reach * 1e3:.0f} mm: nothing is kept clear by it.",
+                    f"{reach * 1e3:.0f} mm: nothing is kept clear by it."
                 )
             )
     return notices

@@ -68,7 +68,7 @@ def counts_notices(robot: Robot) -> list[Notice]:
     return [
         CONTROLLER_COUNTS_ASSUMED(
             f"It is not known how the controller of {robot.name} counts its joints: the program has the model's "
-            "joint positions.",
+            "joint positions."
         )
     ]
 

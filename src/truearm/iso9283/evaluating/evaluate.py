@@ -305,7 +305,7 @@ def _warnings(
         notices.append(
             BEST_FIT_ALIGNMENT(
                 "The frame of the instrument was fitted to the attained poses. That hides a part of the error that "
-                "pose and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small.",
+                "pose and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small."
             )
         )
     notices += row_notices(found)
@@ -325,16 +325,14 @@ def _warnings(
         notices.append(
             INSTRUMENT_TOO_COARSE(
                 f"What instrument and tie leave open is more than a quarter of some values of {', '.join(names)}. "
-                "They say more about the measurement than about the robot.",
+                "They say more about the measurement than about the robot."
             )
         )
     return (*notices, *said_of_streams(found), *said_of_rounding(found, instrument))
 
 
 PLAN_CHANGED: Final = Rule(
-    "plan-changed",
-    "note",
-    "`plan.yaml` was changed since truearm wrote it. Values are held against what it says now",
+    "plan-changed", "note", "`plan.yaml` was changed since truearm wrote it. Values are held against what it says now"
 )
 
 
@@ -348,7 +346,7 @@ def _of_plan(path: Path) -> tuple[Notice, ...]:
     return (
         PLAN_CHANGED(
             f"{path.name} was changed since truearm wrote it, and programs and sheet beside it are not those of this "
-            "plan. Values are held against what it says now.",
+            "plan. Values are held against what it says now."
         ),
     )
 
@@ -381,7 +379,7 @@ def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
         notices.append(
             ALIGNMENT_DIFFERS(
                 f"The two results were tied to the base in different ways: {', '.join(beside.left_out)} are not "
-                "compared.",
+                "compared."
             )
         )
     if beside.unlike:
@@ -391,7 +389,7 @@ def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
         notices.append(
             PLAN_UNKNOWN(
                 "The other result does not say what was planned, as it was written by an older version: whether poses, "
-                "paths, tip and limit band were the same cannot be told.",
+                "paths, tip and limit band were the same cannot be told."
             )
         )
     return tuple(notices)

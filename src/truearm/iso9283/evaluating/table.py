@@ -252,25 +252,17 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
         if len(outlying) > _TOLD:
             told += f" So do {counted(len(outlying) - _TOLD, 'other row')}, on line "
             told += f"{', '.join(str(int(row.of.line[0])) for row in outlying[_TOLD:])}."
-        notices.append(
-            OUTLYING_ROW(
-                f"{told} The standard excludes no row, and none was left out.",
-            )
-        )
+        notices.append(OUTLYING_ROW(f"{told} The standard excludes no row, and none was left out."))
     if found.outlying_pushes:
         told = " ".join(_push_words(push) for push in found.outlying_pushes)
-        notices.append(
-            OUTLYING_PUSH(
-                f"{told} The standard excludes no reading, and none was left out.",
-            )
-        )
+        notices.append(OUTLYING_PUSH(f"{told} The standard excludes no reading, and none was left out."))
     if places:
         told = "; ".join(_places_words(place) for place in places[:_TOLD])
         more = f"; and {len(places) - _TOLD} more" if len(places) > _TOLD else ""
         notices.append(
             TWO_PLACES(
                 f"The tip comes to rest in two places: {told}{more}. The values stand, but the intervals of RP and RD "
-                "may not hold.",
+                "may not hold."
             )
         )
     if found.unusual.alike:
@@ -282,7 +274,7 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
         notices.append(
             CYCLES_ALIKE(
                 f"Each cycle is like the one before it: {told}. Intervals assume that cycles are independent, and are "
-                "too narrow here.",
+                "too narrow here."
             )
         )
     turned = [v for v in found.values if v.id == "AP" and v.quantity == "angle" and abs(v.value) > _FAR_TURNED]
@@ -292,7 +284,7 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
             ORIENTATION_FAR_OFF(
                 f"Orientations are off by up to {number_words(worst)} deg (AP {worst.component} of {worst.where}). "
                 "Robots are seldom off by a degree: check that they are those of the plan's tip, and the rotation of "
-                "the alignment.",
+                "the alignment."
             )
         )
     if found.missing:
@@ -300,21 +292,17 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
         more = f"; and {len(found.missing) - _TOLD_PLACES} more" if len(found.missing) > _TOLD_PLACES else ""
         notices.append(
             PLACES_MISSING(
-                f"Planned and without a row: {told}{more}. The worst of the others is not what the standard asks for.",
+                f"Planned and without a row: {told}{more}. The worst of the others is not what the standard asks for."
             )
         )
     return tuple(notices)
 
 
 TOO_FEW_CYCLES: Final = Rule(
-    "too-few-cycles",
-    "warning",
-    "fewer cycles than planned, with the place and how many of how many; the values stand",
+    "too-few-cycles", "warning", "fewer cycles than planned, with the place and how many of how many; the values stand"
 )
 MORE_CYCLES: Final = Rule(
-    "more-cycles",
-    "note",
-    "more cycles than planned: all are in the values. Check that none belongs to another test",
+    "more-cycles", "note", "more cycles than planned: all are in the values. Check that none belongs to another test"
 )
 
 
@@ -337,7 +325,7 @@ def cycle_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
         notices.append(
             MORE_CYCLES(
                 f"More cycles than planned were measured: {_some(more)}. All of them are in the values; check that "
-                "none belongs to another test.",
+                "none belongs to another test."
             )
         )
     return notices
@@ -362,7 +350,7 @@ def cube_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
         OTHER_CUBE(
             f"The poses of {other.test} lie as those of a cube of {side * other.scale:.1f} mm, where the plan has "
             f"{side:.1f} mm, with its middle {1e3 * other.aside:.1f} mm aside. No robot is off like that: were they "
-            "measured for another plan, or is the tie to the base another one?",
+            "measured for another plan, or is the tie to the base another one?"
         )
     ]
 
@@ -393,7 +381,7 @@ def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:
         COPIED_SAMPLES(
             f"Cycles have samples at the same places to the last digit: {told}{more}. No robot does that: one was "
             "copied from the other, or the readings are simulated without noise. RT and what else says how cycles "
-            "differ is too small.",
+            "differ is too small."
         )
     ]
 

@@ -30,9 +30,7 @@ _UNITS: Final = {"minutes": 60.0, "hours": 3600.0, "milliseconds": 1e-3}
 
 
 SINGLE_DRIFT_GROUP: Final = Rule(
-    "single-drift-group",
-    "warning",
-    "all cycles of drift are one group, so that there is no change to be told",
+    "single-drift-group", "warning", "all cycles of drift are one group, so that there is no change to be told"
 )
 DRIFT_TIME: Final = Rule(
     "drift-time",
@@ -63,7 +61,7 @@ def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tupl
         made.append(
             SINGLE_DRIFT_GROUP(
                 f"All cycles of drift are one group at {'; '.join(single)}: there is no change to be told. A group "
-                "begins where the numbers of the cycles begin anew, or after a pause.",
+                "begins where the numbers of the cycles begin anew, or after a pause."
             )
         )
     if other or timeless:
@@ -71,7 +69,7 @@ def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tupl
         made.append(
             DRIFT_TIME(
                 f"Drift is planned over {plan.hours:g} h; measured: {told}. dAP and dRP tell the change over the time "
-                "that was measured, and are not those of the plan.",
+                "that was measured, and are not those of the plan."
             )
         )
     return tuple(made)
@@ -160,9 +158,7 @@ def _sideways(pushes: Sequence[PushLine], instrument: Instrument) -> Notice | No
             told.append(f"{name} ({1e3 * sideways:.3g} mm/N, most along {most}; along it {1e3 * along:.3g})")
     if not told:
         return None
-    return SIDEWAYS_PUSH(
-        f"The tip moves more at right angles to the force than along it: {listed(told)}.",
-    )
+    return SIDEWAYS_PUSH(f"The tip moves more at right angles to the force than along it: {listed(told)}.")
 
 
 def _standard_error(pushes: Sequence[PushLine], name: str, instrument: Instrument) -> float:
@@ -209,7 +205,7 @@ def _readings(found: Evaluation, instrument: Instrument) -> Notice | None:
         return None
     return READINGS_ROUNDED(
         f"Readings are rounded more coarsely than the instrument reads: {', '.join(told)}. What that leaves open "
-        "as a standard deviation, in brackets, stands in place of the instrument's.",
+        "as a standard deviation, in brackets, stands in place of the instrument's."
     )
 
 
@@ -233,7 +229,7 @@ def _times(found: Evaluation, instrument: Instrument) -> Notice | None:
         return None
     more = f", and {len(told) - _NAMED} more" if len(told) > _NAMED else ""
     return TIMES_ROUNDED(
-        f"Times are rounded to more than the tip is known to move in: {', '.join(list(told.values())[:_NAMED])}{more}.",
+        f"Times are rounded to more than the tip is known to move in: {', '.join(list(told.values())[:_NAMED])}{more}."
     )
 
 
@@ -361,7 +357,7 @@ def _unusual(records: Sequence[_Record]) -> Notice | None:
         return None
     return UNUSUAL_SAMPLES(
         f"Samples lie apart from those about them, as in no other cycle there: {_worst(named)}. If it was the "
-        "instrument, remove these lines: samples may be missing. If it was the robot, they belong into the figures.",
+        "instrument, remove these lines: samples may be missing. If it was the robot, they belong into the figures."
     )
 
 
@@ -376,9 +372,7 @@ def _called(run: Run) -> str:
 
 
 SLOW_PATH: Final = Rule(
-    "slow-path",
-    "warning",
-    "paths were run much slower than commanded. Check `velocity [%]` and the rated velocity",
+    "slow-path", "warning", "paths were run much slower than commanded. Check `velocity [%]` and the rated velocity"
 )
 
 
@@ -393,14 +387,12 @@ def _slow(runs: Sequence[Run]) -> Notice | None:
     more = f", and {len(told) - _NAMED_PATHS} more" if len(told) > _NAMED_PATHS else ""
     return SLOW_PATH(
         f"Paths were run much slower than commanded: {', '.join(told[:_NAMED_PATHS])}{more}. If the robot cannot, that "
-        "is what AV says; otherwise check velocity [%] and the rated velocity of the plan.",
+        "is what AV says; otherwise check velocity [%] and the rated velocity of the plan."
     )
 
 
 SAMPLED_TOO_SLOWLY: Final = Rule(
-    "sampled-too-slowly",
-    "warning",
-    "samples are too far apart for some values, which are marked. Sample faster",
+    "sampled-too-slowly", "warning", "samples are too far apart for some values, which are marked. Sample faster"
 )
 
 
@@ -418,7 +410,7 @@ def _sparse(found: Evaluation) -> Notice | None:
         return None
     return SAMPLED_TOO_SLOWLY(
         f"Samples are too far apart for some values of {listed(tuple(told))}: what lies between two of them is not "
-        "seen. Those values are marked; sample faster.",
+        "seen. Those values are marked; sample faster."
     )
 
 
@@ -446,7 +438,7 @@ def _outlying(found: Evaluation) -> Notice | None:
         return None
     return OUTLYING_CYCLE(
         f"Cycles lie apart from the others of their path as a whole: {_worst(named)}. The standard excludes no cycle, "
-        "and none was left out.",
+        "and none was left out."
     )
 
 
@@ -476,7 +468,7 @@ def _gaps(runs: Sequence[Run]) -> Notice | None:
         return None
     return GAP_IN_PATH(
         f"Samples are missing on a part of the way: {_worst(named)}. Values there come from straight lines between the "
-        "samples before and behind.",
+        "samples before and behind."
     )
 
 
@@ -496,7 +488,7 @@ def _bandwidth(found: Evaluation) -> Notice | None:
     upto = f"{high:.2g} Hz" if high < 1.1 * low else f"{low:.2g} to {high:.2g} Hz"
     return VELOCITY_BANDWIDTH(
         f"FV and its interval tell what fluctuates with up to {upto}: faster fluctuation is smoothed away together "
-        "with the instrument's noise.",
+        "with the instrument's noise."
     )
 
 
@@ -516,5 +508,5 @@ def _aside(found: Evaluation) -> Notice | None:
         f"At {len(there)} of {len(found.corners)} corners the path as a whole lies beside its command by more than "
         f"half of CR, which CR and CO contain. At {worst.where} it lies {1e3 * worst.offset:.3f} mm beside, and CR of "
         f"{1e3 * float(worst.rounding.mean()):.3f} mm would be {1e3 * float(worst.own.mean()):.3f} mm from its own "
-        "corner.",
+        "corner."
     )

@@ -52,11 +52,7 @@ def planned(asked: PlanTests) -> Iso9283Plan:
     warnings = wider_limits_notices(arm)
     rated = _rated_load(arm, asked.load)
     if asked.velocity is None:
-        warnings.append(
-            RATED_VELOCITY_ASSUMED(
-                f"100 % is taken for {_ASSUMED_VELOCITY * 1e3:g} mm/s along a path.",
-            )
-        )
+        warnings.append(RATED_VELOCITY_ASSUMED(f"100 % is taken for {_ASSUMED_VELOCITY * 1e3:g} mm/s along a path."))
     where = str(asked.constraints) if isinstance(asked.constraints, str | Path) else "constraints"
     cell = stated_cell(arm, rules, where, asked.clearance)
     with refusals_of("cube"):

@@ -528,7 +528,7 @@ def _near(robot: Robot, ways: Mapping[str, Array]) -> list[Notice]:
     return [
         WAYS_NEAR(
             f"On {len(near)} of {len(looked)} ways the arm comes within {cell.clearance * 1e3:g} mm of the floor or of "
-            f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {room * 1e3:.0f} mm.",
+            f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {room * 1e3:.0f} mm."
         )
     ]
 

@@ -363,7 +363,7 @@ ANOTHER_TRUTH: Final = Rule(
 def _of_another(off: float, nominal: float) -> Notice:
     return ANOTHER_TRUTH(
         f"The calibrated robot misses this twin by {1e3 * off:.2g} mm, the nominal one by {1e3 * nominal:.2g} mm (root "
-        f"mean square at {_LOCATED} configurations): it was calibrated on another truth, or badly.",
+        f"mean square at {_LOCATED} configurations): it was calibrated on another truth, or badly."
     )
 
 

@@ -26,7 +26,7 @@ _PAUSE: Final = 0.5
 _MODELS: Final = (*(model.name for model in MODELS), AUTO, FRAMES.name)
 _STALE: Final = OTHER_SETTINGS(
     "The figures below were made with another robot, measurements, payload, exclusions or settings than are chosen "
-    "now. Calibrate again, or look at the page Proof: it says what the result is of, and what differs.",
+    "now. Calibrate again, or look at the page Proof: it says what the result is of, and what differs."
 )
 
 

@@ -21,9 +21,7 @@ from truearm.studio.uploads import Upload
 from truearm.studio.window import Window
 
 PAYLOAD_FAR: Final = Rule(
-    "payload-far",
-    "warning",
-    "the centre of the payload is farther from the flange than the arm is long",
+    "payload-far", "warning", "the centre of the payload is farther from the flange than the arm is long"
 )
 
 

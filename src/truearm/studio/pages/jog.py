@@ -407,11 +407,7 @@ def _other_robot(other: str, robot: Robot) -> Notice:
     return OTHER_ROBOT(text)
 
 
-NO_REAL_ROBOT: Final = Rule(
-    "no-real-robot",
-    "note",
-    "jogging moves a drawing",
-)
+NO_REAL_ROBOT: Final = Rule("no-real-robot", "note", "jogging moves a drawing")
 
 
 def _no_robot() -> Notice:

@@ -42,15 +42,9 @@ _DONE: Final = "Measured: the page Check tells whether the measurements can be b
 
 
 NOT_TAKEN: Final = Rule(
-    "not-taken",
-    "warning",
-    "rows or lines of an instrument that could not be read, by file and line",
+    "not-taken", "warning", "rows or lines of an instrument that could not be read, by file and line"
 )
-MEASURED: Final = Rule(
-    "measured",
-    "note",
-    "the measurements are written and chosen",
-)
+MEASURED: Final = Rule("measured", "note", "the measurements are written and chosen")
 
 
 class MeasurePage:

@@ -41,9 +41,7 @@ _TAUGHT: Final = (
 
 
 OTHER_PROGRAM: Final = Rule(
-    "other-program",
-    "warning",
-    "the corrected program is of another state of the project, and is not handed out",
+    "other-program", "warning", "the corrected program is of another state of the project, and is not handed out"
 )
 
 

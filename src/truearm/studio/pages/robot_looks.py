@@ -20,11 +20,7 @@ _FILES: Final = (".urdf", ".stl", ".obj")
 _LONGEST: Final = 600
 
 
-WITHOUT_MESHES: Final = Rule(
-    "without-meshes",
-    "note",
-    "links of a URDF are drawn without meshes, and why",
-)
+WITHOUT_MESHES: Final = Rule("without-meshes", "note", "links of a URDF are drawn without meshes, and why")
 
 
 class RobotLooks:

@@ -192,7 +192,7 @@ def uneven_deviations(cells: Cells, content: MappingFile, mapping: Path) -> list
             SIGMA_UNEVEN(
                 f"The deviations of {whole} of one reading are {np.median(apart):.2g} times apart in half of the "
                 f"readings or more, and up to {apart.max():.2g} times. Data have one {name} for all three, the root of "
-                "their mean square: the best coordinate counts less than it could, and the worst one more.",
+                "their mean square: the best coordinate counts less than it could, and the worst one more."
             )
         )
     return notices
@@ -246,7 +246,7 @@ def _of_radians(large: Array, what: str, entry: str) -> Notice:
     return RADIANS_UNLIKELY(
         f"The angles of {what} are read as radians and go beyond a full turn in {rows} of "
         f"{counted(len(large), 'row')}, up to {large.max():.4g}: they look like degrees. Correct {entry} in the "
-        "mapping, if they are.",
+        "mapping, if they are."
     )
 
 

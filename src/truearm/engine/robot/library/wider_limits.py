@@ -40,7 +40,7 @@ def wider_limits_notices(robot: Robot) -> list[Notice]:
     return [
         LIMITS_WIDER(
             f"The robot is called {robot.name}, and its joints go further than those of {robot.name} in the library: "
-            f"{'; '.join(wider)}.",
+            f"{'; '.join(wider)}."
         )
     ]
 

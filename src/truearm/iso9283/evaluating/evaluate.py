@@ -293,7 +293,6 @@ INSTRUMENT_TOO_COARSE: Final = Rule(
     "instrument-too-coarse",
     "warning",
     "what instrument and tie leave open is more than a quarter of some values",
-    gravity=2,
 )
 
 

@@ -210,6 +210,7 @@ OUTLYING_ROW: Final = Rule(
     "rows lie far from the other cycles of their pose; the values with and without them are said",
     cure="Look at the record, and measure the pose again if the reading was at fault.",
     formerly="wild-row",
+    gravity=2,
 )
 OUTLYING_PUSH: Final = Rule(
     "outlying-push",
@@ -217,6 +218,7 @@ OUTLYING_PUSH: Final = Rule(
     "readings under a push lie far from the line of the others; compliance with and without them is said",
     cure="Look at the record, and push again if the reading was at fault.",
     formerly="wild-push",
+    gravity=2,
 )
 TWO_PLACES: Final = Rule(
     "two-places",

@@ -420,6 +420,7 @@ OUTLYING_CYCLE: Final = Rule(
     "cycles lie apart from the others of their path as a whole; AT and RT with and without them are said",
     cure="Look at the record, and measure the cycle again if the instrument or its mount moved.",
     formerly="wild-cycle",
+    gravity=2,
 )
 
 

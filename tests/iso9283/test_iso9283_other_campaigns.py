@@ -105,6 +105,37 @@ def test_directions_under_the_name_of_another_axis_are_said(small: Arguments) ->
     assert "+z" not in notices(found)["sideways-push"].message
 
 
+def test_a_push_beside_the_line_of_the_others_is_said_with_and_without_it(small: Arguments) -> None:
+    rows: list[Row] = []
+
+    def off_on_line_4(row: Row) -> None:
+        rows.append(row)
+        if len(rows) == 3:
+            row["x [mm]"] = str(float(row["x [mm]"]) + 3.0)
+
+    assert "outlying-push" not in notices(evaluated(small, "forces"))
+    said = notices(forces_of(small, off_on_line_4))["outlying-push"]
+    assert (said.level, said.summary()["formerly"]) == ("warning", "wild-push")
+    assert "line 4" in said.message
+    assert "without it" in said.message
+
+
+def test_poses_of_another_cube_are_said(small: Arguments) -> None:
+    rows: list[Row] = []
+    each_row(small["poses"], rows.append)
+    columns = ("x [mm]", "y [mm]", "z [mm]")
+    middle = {name: sum(float(row[name]) for row in rows) / len(rows) for name in columns}
+
+    def larger(row: Row) -> None:
+        row.update({name: str(middle[name] + 1.05 * (float(row[name]) - middle[name])) for name in columns})
+
+    assert "other-cube" not in notices(evaluated(small, "poses"))
+    each_row(small["poses"], larger)
+    said = notices(evaluated(small, "poses"))["other-cube"].message
+    assert "lie as those of a cube of" in said
+    assert "Give the plan.yaml that was measured." in said
+
+
 def test_posing_times_are_held_against_the_planned_distance(tmp_path: Path) -> None:
     given = planned_in(tmp_path, small_plan(["posing-time"], cycles={"posing-time": 1}), rate=100.0)
     settling = given["settling"]

@@ -193,7 +193,7 @@ def test_texts_name_parameters_of_these_jobs_alone() -> None:
                 assert named <= known, (file.name, node.value)
 
 
-def test_a_outlying_row_is_said_with_the_value_without_it(small: Arguments) -> None:
+def test_an_outlying_row_is_said_with_the_value_without_it(small: Arguments) -> None:
     assert not {"outlying-row", "two-places", "places-missing"} & {*notices(evaluated(small, "poses"))}
     lines: list[Row] = []
 

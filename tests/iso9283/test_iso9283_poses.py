@@ -282,7 +282,7 @@ def test_compliance_of_a_linear_spring() -> None:
     assert lines[0].displacement == pytest.approx(lines[0].force * 2e-6, abs=1e-12)
 
 
-def test_a_outlying_push_is_named_and_no_other() -> None:
+def test_an_outlying_push_is_named_and_no_other() -> None:
     task = plan(PlannedTest("compliance", ("P1",), 3))
     rng = np.random.default_rng(2)
     read = pushes()

@@ -142,7 +142,7 @@ def test_clean_campaigns_are_silent() -> None:
     ("test", "criteria"),
     [("AP", ("AP", "RP")), ("vAP", ("vAP",)), ("AD", ("AD", "RD")), ("dAP", ("dAP", "dRP")), ("E", ("E",))],
 )
-def test_a_outlying_row_is_named_with_what_it_changes(test: str, criteria: tuple[str, ...]) -> None:
+def test_an_outlying_row_is_named_with_what_it_changes(test: str, criteria: tuple[str, ...]) -> None:
     plan, read = campaign(1, (test,))
     where: dict[str, dict[str, Any]] = {
         "AP": {"pose": "P3", "velocity": 0.5},
@@ -173,7 +173,7 @@ def test_a_outlying_row_is_named_with_what_it_changes(test: str, criteria: tuple
         assert rp_without.value < 2e-4
 
 
-def test_a_outlying_orientation_is_named() -> None:
+def test_an_outlying_orientation_is_named() -> None:
     plan, read = campaign(1, ("AP",))
     row = int(rows_of(read, criterion="AP", pose="P2", cycle=9)[0])
     assert read.rotation is not None

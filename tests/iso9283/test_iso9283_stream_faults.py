@@ -89,7 +89,7 @@ def test_a_record_that_jumps_and_stays_or_is_outlying_all_over_is_refused() -> N
     assert "no tip can have been" in refusal_of_path(replace(samples, position=samples.position + off))
 
 
-def test_a_outlying_sample_on_the_way_to_rest_is_refused() -> None:
+def test_an_outlying_sample_on_the_way_to_rest_is_refused() -> None:
     samples = resting()
     with pytest.raises(InputError, match=r"line 2802: cycle 3 of t at P1 has samples where no tip can have been"):
         settling_values(PLAN, moved(samples, [2800], 5e-3), HERE, EXACT)

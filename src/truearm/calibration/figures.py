@@ -128,7 +128,6 @@ def _squares(square: float, deviation: float) -> str:
 _BAND: Final = "#c3d5e3"
 _UNMEASURED: Final = "#e4e6e8"
 _PLACES: Final = "#646b72"
-_INK: Final = "#2b2f33"
 #: Width of an interval of 95 % to either side in standard deviations.
 _NORMAL_95: Final = 1.959964
 #: Beyond so many times the size of the measured part the picture ends, however wide the band.

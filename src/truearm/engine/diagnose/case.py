@@ -89,26 +89,31 @@ class Case:
         ]
 
     @cached_property
-    def of_robot(self) -> tuple[list[Notice], list[Notice]]:
+    def of_robot(self) -> list[Notice]:
         """Whether it can be this robot at all, and whether its lengths are this one's."""
         told = [notice for notice in self.noticed if notice.code == WRONG_ROBOT.code]
         other = check_robot(self.fit, self.training) if judges_lengths(self.fit) and not self.biased else told
         if has_error([*self.of_data, *self.changes]):  # what is wrong with the data bends the robot too
             other = []
         unlike = check_plausible(self.fit, self.training, (*self.of_data, *other, *told))
-        return unlike, (other or told) if unlike else other
+        return [*unlike, *(other or told)] if unlike else other
+
+    @property
+    def implausible(self) -> bool:
+        """Whether it cannot be this robot."""
+        return any(notice.code == IMPLAUSIBLE.code for notice in self.of_robot)
 
     @cached_property
     def expected(self) -> ExpectedError:
         """How accurate the robot is where it was not measured."""
         doubted = has_error([*self.of_data, *self.changes]) or any(n.code in _DOUBTING for n in self.of_data)
-        plausible = not self.of_robot[0]
-        return expected_error(as_residuals_allow(self.fit, self.training), plausible=plausible, doubted=doubted)
+        allowed = as_residuals_allow(self.fit, self.training)
+        return expected_error(allowed, plausible=not self.implausible, doubted=doubted)
 
     @property
     def status(self) -> Status:
         """How it ended: a fit that cannot be this robot is implausible, however well it converged."""
-        return Status.IMPLAUSIBLE if self.of_robot[0] else self.fit.status
+        return Status.IMPLAUSIBLE if self.implausible else self.fit.status
 
     @cached_property
     def few(self) -> list[Notice]:
@@ -119,12 +124,13 @@ class Case:
     def sigma(self) -> tuple[list[Notice], list[Notice]]:
         """Whether declared deviations are too large; and whether they hide errors of the joints."""
         too_large = check_sigma(self.left)
-        unlike = self.of_robot[0]
-        return too_large, [] if unlike or has_error(too_large) else check_sigma_beside_joints(self.left)
+        if self.implausible or has_error(too_large):
+            return too_large, []
+        return too_large, check_sigma_beside_joints(self.left)
 
     def unsilenced(self, told: Sequence[Notice]) -> list[Notice]:
         """Return the notices but those that say nothing beside the others, by what their rules say."""
         silencing = {notice.code for notice in told}
-        silencing |= {WRONG_DATA} if has_error([*self.of_data, *self.of_robot[0], *self.of_robot[1]]) else set()
+        silencing |= {WRONG_DATA} if has_error([*self.of_data, *self.of_robot]) else set()
         silencing |= {PULLED_AWAY} if self.biased else set()
         return [notice for notice in told if notice.rule is None or notice.rule.unless.isdisjoint(silencing)]

@@ -256,8 +256,8 @@ DRIFT: Final = Rule(
     "all readings moved evenly during the campaign: [what moved](check.md#what-moved-during-the-campaign)",
     gravity=2,
 )
-#: Codes of what moved during a campaign.
 _RULES: Final = {rule.code: rule for rule in (INSTRUMENT_MOVED, TARGET_MOVED, JOINT_ZERO_JUMPED, DRIFT)}
+#: Codes of what moved during a campaign.
 OF_CHANGES: Final = frozenset(_RULES)
 
 

@@ -99,7 +99,7 @@ def _check_narrow(case: Case) -> list[Notice]:
 #: What is asked of every fit. What one tells may silence another, by :attr:`Rule.unless`.
 CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
     lambda case: case.of_data,
-    lambda case: [*case.of_robot[0], *case.of_robot[1]],
+    lambda case: case.of_robot,
     lambda case: check_separate_visits(case.left),
     lambda case: check_curves_of_loads(case.left),
     lambda case: check_far_from_nominal(case.fit),

@@ -304,7 +304,6 @@ def _joints_of_others(data: Dataset, predicted: Array, doubted: IntArray, allowe
     return found
 
 
-#: The code of the notice.
 ORIENTATION_OUTLIERS: Final = Rule(
     "orientation-outliers",
     "warning",

@@ -18,7 +18,6 @@ from truearm.engine.robot.chain import Array
 # errors of one size, and a few wrong readings, which both robots miss alike, do not decide it. With fewer than seven
 # pairs no result of it has a probability below 1 %, so that nothing is said of so few.
 
-#: The calibrated robot is no better than the nominal one, as far as unseen configurations tell.
 NO_GAIN: Final = Rule(
     "no-gain",
     "warning",
@@ -26,7 +25,6 @@ NO_GAIN: Final = Rule(
     "[more](results.md#better-than-nominal)",
     gravity=2,
 )
-#: It is significantly worse.
 WORSE: Final = Rule(
     "worse-than-nominal",
     "error",

@@ -161,7 +161,6 @@ def check_plausible(fit: Fit, data: Dataset, others: Iterable[Notice] = ()) -> l
 # Angles are left out of account, for a robot that was mastered badly is a degree off and the same robot. Their priors
 # are taken ten times as wide, so that what they do cannot pass for lengths.
 
-#: The code of the notice.
 WRONG_ROBOT: Final = Rule(
     "wrong-robot",
     "error",

@@ -49,9 +49,8 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import SCALE, FreeParameters
 from truearm.engine.robot.robot import Robot
 
-#: Configurations below which draws are too much alike, and fits from which deviations are known to a tenth or so.
+#: Configurations below which draws are too much alike.
 LEAST_CONFIGURATIONS: Final = 10
-LEAST_FITS: Final = 20
 #: Step of each fit that is the last, in priors or mm: deviations need no more digits.
 _SMALL: Final = 1e-4
 

@@ -48,7 +48,6 @@ from truearm.engine.robot.transform import rotation_from_quaternion
 
 SCHEMA: Final = "truearm-path/1"
 #: In what a path may be given.
-PATH_FRAMES: Final = ("nominal", "base", "world")
 PathFrame = Literal["nominal", "base", "world"]
 #: Waypoints nearer to each other than this are one [m].
 _SAME: Final = 1e-6

@@ -229,7 +229,7 @@ def test_a_fit_that_does_not_converge_is_an_error(monkeypatch: pytest.MonkeyPatc
     known = found().fit
     monkeypatch.setattr(job, "calibrate_tilting", unsettled)
     result = truearm.tilting(KATANA, inclinations())
-    assert codes(result)["tilting-not-converged"] == "error"
+    assert codes(result)["not-converged"] == "error"
     assert result.summary()["status"] == "not-converged"
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from truearm.engine.base.errors import InputError, Notice, Rule, counted, listed
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.inclinations import Inclinations, InclinometerReadings, Instruments, Pairs
+from truearm.engine.diagnose.advice import NOT_CONVERGED
 from truearm.engine.fit.frames import initial_frames
 from truearm.engine.fit.solver import solve
 from truearm.engine.robot.chain import Array
@@ -461,14 +462,11 @@ def check_tilting(start: Robot, fit: TiltingFit, read: Inclinations, *, pushed: 
     )
 
 
-TILTING_NOT_CONVERGED: Final = Rule("tilting-not-converged", "error", "the solver's steps did not become small")
-
-
 def _not_converged(fit: TiltingFit) -> list[Notice]:
     if fit.converged:
         return []
     message = "The solver's steps did not become small. Check forces, payloads, masses and joint positions."
-    return [TILTING_NOT_CONVERGED(message)]
+    return [NOT_CONVERGED(message)]
 
 
 TILTING_BELOW_ZERO: Final = Rule(

@@ -87,9 +87,12 @@ class _Client:
     lines: int = 0
 
 
-WRONG_TOKENS: Final = Rule("wrong-tokens", "warning", "connections without the right token")
-LINES_REFUSED: Final = Rule("lines-refused", "warning", "lines that could not be taken")
-CUT_OFF: Final = Rule("cut-off", "warning", "connections that sent too much, or were too many")
+LINES_REFUSED: Final = Rule(
+    "lines-refused",
+    "warning",
+    "lines that could not be taken, and connections that were ended: without the right token, too many, or with too "
+    "much at once. Each was answered by a line that says why",
+)
 
 
 # Readings sent by a program of this machine, a line each, over TCP.
@@ -142,7 +145,7 @@ class Listener:
         found = []
         if self._wrong_tokens:
             found.append(
-                WRONG_TOKENS(
+                LINES_REFUSED(
                     f"{counted(self._wrong_tokens, 'connection')} without the right token "
                     f"{'was' if self._wrong_tokens == 1 else 'were'} refused."
                 )
@@ -151,7 +154,7 @@ class Listener:
             found.append(LINES_REFUSED(f"{counted(self._refused, 'line')} that came could not be taken."))
         if self._cut_off:
             found.append(
-                CUT_OFF(
+                LINES_REFUSED(
                     f"{counted(self._cut_off, 'connection')} sent too much at once, or connected beside too many "
                     "others, and was cut off."
                 )

@@ -85,9 +85,9 @@ def read_otherwise(way: str) -> Dataset:
         ("degrees", "orientation-order", "angles about zyx of moving axes, but in radians that were called degrees"),
         ("rotation vector", "orientation-order", "not a rotation vector but angles about zyx of moving axes"),
         ("angles for a vector", "orientation-order", "not angles about zyx of moving axes but a rotation vector"),
-        ("transposed", "quaternion-order", "they turn the other way round, as transposed matrices do"),
-        ("from the wrong end", "quaternion-order", "w, x, y, z were taken for x, y, z, w"),
-        ("from the other end", "quaternion-order", "in the order x, y, z, w"),
+        ("transposed", "orientation-order", "they turn the other way round, as transposed matrices do"),
+        ("from the wrong end", "orientation-order", "w, x, y, z were taken for x, y, z, w"),
+        ("from the other end", "orientation-order", "in the order x, y, z, w"),
     ],
 )
 def test_the_convention_that_was_meant_is_named(way: str, code: str, words: str) -> None:
@@ -108,7 +108,7 @@ def test_a_rotation_vector_that_was_read_as_angles_is_named() -> None:
 
 
 def test_a_check_says_it_too_and_nothing_of_sound_orientations() -> None:
-    for data, codes in ((sound(), []), (read_otherwise("from the other end"), ["quaternion-order"])):
+    for data, codes in ((sound(), []), (read_otherwise("from the other end"), ["orientation-order"])):
         assert [n.code for n in check(ROBOT, data).warnings if n.level == "error"] == codes
 
 
@@ -190,7 +190,7 @@ def test_rows_of_another_convention_are_named_beside_one_that_is_off() -> None:
     assert single.code == "orientation-outliers"
     assert "13/1" in single.message
     (inverse,) = check(ROBOT, turned([7], np.swapaxes(orientations([7]), 1, 2))).warnings
-    assert (inverse.code, inverse.level) == ("quaternion-order", "error")
+    assert (inverse.code, inverse.level) == ("orientation-order", "error")
 
 
 def test_noise_of_orientations_that_was_declared_is_allowed() -> None:

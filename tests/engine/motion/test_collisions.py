@@ -368,9 +368,9 @@ def test_tiny_boxes_and_boxes_out_of_reach_are_said() -> None:
     tiny = KeepOut("in metres", np.array([0.35e-3, -0.4e-3, 0.1e-3]), np.array([0.8e-3, 0.4e-3, 0.2e-3]))
     far = KeepOut("in inches", np.array([35.0, -np.inf, -np.inf]), np.full(3, np.inf))
     first, second = cell_notices(CollisionCheck(robot, Cell(boxes=(tiny, far, TABLE))))
-    assert (first.code, first.level) == ("box-tiny", "warning")
+    assert (first.code, first.level) == ("box-unlikely", "warning")
     assert "longest side of the box 'in metres' is 0.8 mm" in first.message
-    assert (second.code, second.level) == ("box-out-of-reach", "warning")
+    assert (second.code, second.level) == ("box-unlikely", "warning")
     assert "The box 'in inches' begins 35000 mm from the base" in second.message
     assert not cell_notices(CollisionCheck(robot, Cell(boxes=(TABLE, BENCH))))
 

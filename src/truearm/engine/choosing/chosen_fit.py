@@ -9,6 +9,7 @@ from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.choosing.search import CURVE
 from truearm.engine.choosing.selection import ORDERED, Selection
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.thinning import JUDGED_IN_PART
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Fit, Status, identify
 from truearm.engine.fit.held import NOTHING_HELD, Held
@@ -74,17 +75,12 @@ def identify_chosen(
         selection = selection.instead(fit.status.value)
 
 
-CHOSEN_IN_PART: Final = Rule(
-    "chosen-in-part", "note", "the data are large: `auto` chose the model by a part of the training configurations"
-)
-
-
 def check_part(compared: Dataset, data: Dataset) -> list[Notice]:
     """Say if a model was chosen by a part of the data."""
     if compared.configurations == data.configurations:
         return []
     return [
-        CHOSEN_IN_PART(
+        JUDGED_IN_PART(
             f"The data are large for so many effects: the model was chosen by {compared.configurations} of "
             f"{counted(data.configurations, 'training configuration')}, evenly spaced, and fitted to all of them."
         )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.engine.base.errors import Notice, Rule, counted, worst_first
+from truearm.engine.data.thinning import JUDGED_IN_PART
 from truearm.engine.diagnose.advice import check_far_from_nominal, check_fit
 from truearm.engine.diagnose.case import Case
 from truearm.engine.diagnose.changes import OF_CHANGES
@@ -123,14 +124,6 @@ def diagnose(case: Case) -> Diagnosis:
     """Judge a fit: ask every check, leave out what others silence, and say what to do next."""
     warnings = worst_first(case.unsilenced([notice for check in CHECKS for notice in check(case)]))
     return Diagnosis(case.expected, warnings, steps_after_fit(case, warnings))
-
-
-JUDGED_IN_PART: Final = Rule(
-    "judged-in-part",
-    "note",
-    "the data are large: what the fit leaves was looked at in a part of the configurations, as many as the "
-    "[limit](data.md#limits) of derivatives has room for",
-)
 
 
 def _in_part(left: LeftOver) -> list[Notice]:

@@ -273,20 +273,15 @@ def shifted(data: Dataset) -> Iterator[EntryError]:
 # fixed axes (Craig, Introduction to Robotics, appendix B), and rotation vectors; in radians, and in radians that were
 # called degrees.
 
-QUATERNION_ORDER: Final = Rule(
-    "quaternion-order",
-    "error",
-    "quaternions, all or some, that do not turn as the robot does: another order, or the inverse, as of transposed "
-    "matrices",
-)
 ORIENTATION_ORDER: Final = Rule(
     "orientation-order",
     "error",
-    "orientations, all or some, that would turn as the robot does [if their angles were read "
-    "otherwise](check.md#orientations-read-by-another-convention)",
+    "orientations, all or some, that would turn as the robot does if their numbers were read otherwise: [angles by "
+    "another convention](check.md#orientations-read-by-another-convention), quaternions in another order, or their "
+    "inverse, as of transposed matrices",
     cure="Fix the mapping, or whatever made quaternions of them.",
+    formerly="quaternion-order",
 )
-ORIENTATION_ENTRY_ERRORS: Final = frozenset({QUATERNION_ORDER, ORIENTATION_ORDER})
 #: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
 _TURNED_WITHIN: Final = 0.1
 #: A data-entry error explains orientations that it leaves so near to the robot's [rad], and so many times nearer than
@@ -334,7 +329,7 @@ def orientation_entry_errors(robot: Robot, data: Dataset) -> list[Notice]:
         (readings.left(rotation_from_quaternion(corrected)), words) for words, corrected in _of_numbers(read)
     )
     if left * _LEAST_IMPROVEMENT <= given:
-        return [QUATERNION_ORDER(f"The quaternions do not turn as the robot does: {words}.")]
+        return [ORIENTATION_ORDER(f"The quaternions do not turn as the robot does: {words}.")]
     if readings.rows < _FEWEST:
         return []
     return _of_angles(readings, rotation_from_quaternion(read), given)
@@ -423,8 +418,8 @@ def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]
     ]
 
 
-def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], Rule, str]:
-    """Return which single orientations turn as they should when they are read otherwise, the rule, and how in words.
+def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], str]:
+    """Return which single orientations turn as they should when they are read otherwise, and how in words.
 
     Of all ways the one is taken that explains most of them: it must explain two, or one by the order of a quaternion.
 
@@ -435,10 +430,7 @@ def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool
     turned = rotation_from_quaternion(read)
     allowed = np.minimum(_EXPLAINED_WITHIN, _angles_between([turned], predicted) / _IMPROVEMENT_OF_ROWS)
     of_numbers = [(0, words, [rotation_from_quaternion(corrected)]) for words, corrected in _of_numbers(read)]
-    for rule, fewest, ways in (
-        (QUATERNION_ORDER, 1, of_numbers),
-        (ORIENTATION_ORDER, _FEWEST_ROWS, _other_conventions(turned)),
-    ):
+    for fewest, ways in ((1, of_numbers), (_FEWEST_ROWS, _other_conventions(turned))):
         tried = []
         for rare, words, turns in ways:
             off = _angles_between(turns, predicted)
@@ -451,8 +443,8 @@ def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool
             least = min(left for _, _, left, _, _ in most)
             told = sorted((rare, left, words) for _, rare, left, words, _ in most if left <= _AS_GOOD * least)
             which = next(explained for *_, words, explained in most if words == told[0][2])
-            return which, rule, _first_of([words for *_, words in told])
-    return np.zeros(len(read), dtype=bool), QUATERNION_ORDER, ""
+            return which, _first_of([words for *_, words in told])
+    return np.zeros(len(read), dtype=bool), ""
 
 
 def _other_conventions(turned: Array) -> Iterator[tuple[int, str, list[Array]]]:

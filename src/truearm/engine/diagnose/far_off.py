@@ -27,7 +27,7 @@ from truearm.engine.data.rigid_tool import (
 from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import repeated_joints
 from truearm.engine.diagnose.entry_error_trials import (
-    ORIENTATION_ENTRY_ERRORS,
+    ORIENTATION_ORDER,
     UNIT_ANGLE,
     EntryError,
     angle_entry_errors,
@@ -310,9 +310,7 @@ ORIENTATION_OUTLIERS: Final = Rule(
     "[orientations far off](check.md#single-orientations-that-are-off) whose positions are not",
 )
 #: Codes of wrong readings that pull a fit away.
-PULLING: Final = frozenset(
-    rule.code for rule in (ORIENTATION_OUTLIERS, *ORIENTATION_ENTRY_ERRORS, JOINTS_MISTAKEN, UNIT_ANGLE)
-)
+PULLING: Final = frozenset(rule.code for rule in (ORIENTATION_OUTLIERS, ORIENTATION_ORDER, JOINTS_MISTAKEN, UNIT_ANGLE))
 #: An orientation is doubted if it is at least so far off [rad].
 _LEAST_TURNED: Final = math.radians(0.5)
 #: A joint turns a reading alike if the turn is about its axis but for this share, and hardly moves it if the target is
@@ -348,14 +346,14 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
     for t in np.unique(data.target[rows]).tolist():
         mine = data.target[rows] == t
         predicted[mine] = fit.robot.world_poses(data.postures, data.targets[t])[1][data.configuration[rows[mine]]]
-    corrected, rule, words = entry_errors_in_rows(data.quaternion[rows], predicted)
+    corrected, words = entry_errors_in_rows(data.quaternion[rows], predicted)
     at = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in rows.tolist()]
     where = ["/".join(one) for one in at]
     found = []
     if corrected.any():
         some = listed([name for name, one in zip(where, corrected.tolist(), strict=True) if one])
         found.append(
-            rule(
+            ORIENTATION_ORDER(
                 f"Some orientations do not turn as the robot does (configuration/target): {some}. They would if their "
                 f"numbers were read otherwise: {words}. Those of the other readings are right. Fix these rows.",
                 "error",

@@ -18,7 +18,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.rigid_tool import OUTLIERS, TARGETS_SWAPPED, Suspect, places_of
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.entry_error_trials import ORIENTATION_ENTRY_ERRORS
+from truearm.engine.diagnose.entry_error_trials import ORIENTATION_ORDER
 from truearm.engine.diagnose.entry_errors import (
     FIXTURES_UNLIKELY,
     entry_errors_by_fit,
@@ -238,9 +238,7 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
     if not data.has_position.any():
         return Comparison(notices)
     entries = entry_errors_in_positions(robot, data)
-    if entries and all(
-        entry.code in {rule.code for rule in ORIENTATION_ENTRY_ERRORS} for entry in entries
-    ):  # the positions are this robot's
+    if entries and all(entry.code == ORIENTATION_ORDER.code for entry in entries):  # the positions are this robot's
         return Comparison([*entries, *notices])
     if entries:
         return Comparison([*(other_robot(robot, data) or entries), *notices])

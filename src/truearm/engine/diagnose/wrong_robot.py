@@ -54,7 +54,6 @@ CAUSES: Final = (
     "joint-sign",
     "rows-shifted",
     "rows-unrelated",
-    "quaternion-order",
     "orientation-order",
     "fixtures-unlikely",
     "wrong-robot",

@@ -139,16 +139,10 @@ def _frame_notices(check: CollisionCheck) -> list[Notice]:
     ]
 
 
-BOX_TINY: Final = Rule(
-    "box-tiny",
+BOX_UNLIKELY: Final = Rule(
+    "box-unlikely",
     "warning",
-    "no side of a box is 10 mm long: its unit is another one",
-    cure="Check the unit of the constraints.",
-)
-BOX_OUT_OF_REACH: Final = Rule(
-    "box-out-of-reach",
-    "warning",
-    "a box that the arm never comes near: its unit or its frame may be another one",
+    "a box that has no side of 10 mm, or that the arm never comes near: its unit or its frame may be another one",
     cure="Check its unit, and that it is in the base frame of the robot.",
 )
 
@@ -162,10 +156,10 @@ def _box_notices(check: CollisionCheck) -> list[Notice]:
         longest = float((box.high - box.low).max())
         away = float(np.linalg.norm(np.clip(0.0, box.low, box.high)))
         if longest < _TINY:
-            notices.append(BOX_TINY(f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm."))
+            notices.append(BOX_UNLIKELY(f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm."))
         elif away - reach > check.need:
             notices.append(
-                BOX_OUT_OF_REACH(
+                BOX_UNLIKELY(
                     f"The box '{box.name}' begins {away * 1e3:.0f} mm from the base, and the arm reaches at most "
                     f"{reach * 1e3:.0f} mm: nothing is kept clear by it."
                 )

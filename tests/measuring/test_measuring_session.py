@@ -213,6 +213,8 @@ def test_every_reading_stays_with_its_reason() -> None:
     other.add(of.entries[0])
     with pytest.raises(InputError, match="does not follow"):
         other.add(Entry(2, "aside", "P1", "b", reason="operator", of=1))
+    with pytest.raises(InputError, match="number 5: this does not follow"):
+        other.add(Entry(5, "aside", "P1", "a", reason="operator", of=4))  # the reading that it takes back is missing
 
 
 def test_readings_of_which_nothing_is_told_are_kept_and_a_clock_that_goes_back_is_told() -> None:

@@ -99,13 +99,15 @@ def test_a_part_of_a_line_at_the_end_is_cut_off(tmp_path: Path) -> None:
         assert path.read_bytes() == whole
 
 
-def test_a_line_that_was_changed_or_says_nothing_is_refused_with_its_number(tmp_path: Path) -> None:
+def test_a_line_that_is_missing_changed_or_says_nothing_is_refused_with_its_number(tmp_path: Path) -> None:
     write(tmp_path)
     path = tmp_path / LOG
     lines = path.read_text().splitlines(keepends=True)
     body = "6,guess,,P1,a,target,,,,,,,,,,,,,,,,,,"
     for changed, said in (
         ([*lines[:2], lines[2].replace("P2", "P3", 1), *lines[3:]], "line 3: this line is not as it was written"),
+        ([*lines[:2], *lines[3:]], "line 3: lines before this one are missing.*; got 'number 3'; allowed: number 2"),
+        ([*lines[:3], *lines[2:]], "line 4: .* or stand there twice; got 'number 2'; allowed: number 3"),
         ([*lines, f"{body},{zlib.crc32(body.encode()):08x}\n"], "line 7: this line cannot be understood"),
     ):
         path.write_text("".join(changed))

@@ -250,6 +250,7 @@ _COLUMNS: Final = (
 )
 _HEADER: Final = ",".join(_COLUMNS)
 _ROLES: Final = ("target", "nest")
+_NOT_EDITED: Final = "A log is not edited: put back the file as it was, or begin in another folder."
 _EVENTS: Final = ("reading", "aside", "left")
 
 
@@ -334,9 +335,18 @@ class ReadingLog:
             raise InputError(
                 "this line is not as it was written",
                 where=f"{self.path}, line {bad}",
-                cure="A log is not edited: put back the file as it was, or begin in another folder.",
+                cure=_NOT_EDITED,
             )
         entries = tuple(self._entry(str(text), number) for number, text in enumerate(texts, 2))
+        for number, entry in enumerate(entries, 1):
+            if entry.number != number:
+                raise InputError(
+                    "lines before this one are missing, or stand there twice",
+                    where=f"{self.path}, line {number + 1}",
+                    came=f"number {entry.number}",
+                    allowed=f"number {number}",
+                    cure=_NOT_EDITED,
+                )
         return len(rest), entries
 
     def _entry(self, text: str, number: int) -> Entry:

@@ -408,8 +408,9 @@ class Session:
             InputError: If an entry does not follow from those before: the log was changed.
         """
         for entry in entries:
-            place = self._place_in_log(entry)
-            if entry.number != len(self) + 1 or not self._follows(entry, place):
+            in_turn = entry.number == len(self) + 1
+            place = self._place_in_log(entry) if in_turn else None
+            if not in_turn or not self._follows(entry, place):
                 raise InputError("this does not follow from what stands before it", where=f"number {entry.number}")
             self._entries.append(entry)
             self._places.append(place)

@@ -52,7 +52,7 @@ def test_loads_and_readings_that_do_not_fit_are_refused() -> None:
     warm = robot.with_effects(["thermal-growth"])
     for arm, readings, parameter, words in (
         ("irb120", data, "robot", "the robot has no targets"),
-        (robot, replace(data, targets=("1", "2", "x")), "target", "no target of this name"),
+        (robot, replace(data, targets=("1", "2", "x"), source="t.csv"), "data", "^t.csv: .* no target of this name"),
         (robot, nothing, "data", "there is no reading"),
         (warm, data, "data", "the data hold no temperature"),
         (robot, data.of_configurations([0]), "data", "two configurations or more"),

@@ -8,7 +8,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from truearm.engine.base.errors import InputError, Notice, Rule, counted, has_error, refusals_of
+from truearm.engine.base.errors import (
+    InputError,
+    Notice,
+    Rule,
+    counted,
+    has_error,
+    name_parameter,
+    name_place,
+    refusals_of,
+)
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.writing import output_folder, write_files
@@ -370,13 +379,21 @@ def as_measured(robot: object, data: object, loads: Loads) -> tuple[Robot, Datas
             where=data.source,
             cure="Add the column temperature [degC].",
         )
-    with refusals_of("data"):
-        for name in data.targets:
-            robot.target(name)
-        for name in data.fixtures:
-            robot.fixture(name)
+    refuse_unknown(data, data.targets, robot.target)
+    refuse_unknown(data, data.fixtures, robot.fixture)
     if not data.has_reading.any():
         raise InputError(
             "there is no reading", parameter="data", where=data.source, cure="Fill in x, y and z, or distance."
         )
     return robot, data
+
+
+def refuse_unknown(data: Dataset, names: Iterable[str], look_up: Callable[[str], object]) -> None:
+    """Refuse data that name what the robot does not have: its method `look_up` refuses that, and cannot name them."""
+    try:
+        for name in names:
+            look_up(name)
+    except InputError as error:
+        name_place(error, data.source)
+        name_parameter(error, "data")
+        raise

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.files import read_text
 from truearm.engine.data.dataset import Dataset
@@ -123,11 +123,11 @@ def test_zero_bytes_all_over_are_said_to_be_of_another_encoding(tmp_path: Path) 
     for encoding in ("utf-16-le", "utf-16-be"):
         table.write_bytes(LONG.encode(encoding))
         mapping.write_text(MAP, encoding="utf-8")
-        with refused("zero bytes are those of UTF-16", "layout.encoding", f": {encoding}"):
+        with refusing("zero bytes are those of UTF-16", "layout.encoding", f": {encoding}"):
             read_table(table, mapping)
         mapping.write_text(f"{MAP}layout: {{encoding: {encoding}}}\n", encoding="utf-8")
         assert read_table(table, mapping).labels == ("a", "b")
-        with refused("UTF-16", "Save it as UTF-8"):
+        with refusing("UTF-16", "Save it as UTF-8"):
             read_text(table)
 
 
@@ -286,11 +286,11 @@ REFUSED: list[tuple[str, str, list[str]]] = [
 
 def test_refusals(tmp_path: Path) -> None:
     for table, mapping, parts in REFUSED:
-        with refused(*parts, of=parts):
+        with refusing(*parts, of=parts):
             read(tmp_path, table, mapping, JOINTS)
     (tmp_path / "map.yaml").write_text(MAP)
     (tmp_path / "table.txt").write_bytes(LONG.replace("two", "tw@").encode().replace(b"@", b"\xe4"))
-    with refused("line 3, cell 4: the file is not utf-8 text"):
+    with refusing("line 3, cell 4: the file is not utf-8 text"):
         read_table(tmp_path / "table.txt", tmp_path / "map.yaml")
 
 

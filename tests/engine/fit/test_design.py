@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.fit.design import (
     INDICES,
@@ -139,9 +139,9 @@ def test_what_only_a_nuisance_feels_is_left_out() -> None:
 
 
 def test_more_than_there_are_is_refused() -> None:
-    with refused("0 to 3"):
+    with refusing("0 to 3"):
         most_informative(np.ones((3, 1, 1)), 4, np.eye(1), O1())
-    with refused("0 to 10"):
+    with refusing("0 to 10"):
         most_informative_number(np.ones((10, 1, 1)), np.eye(1))
 
 

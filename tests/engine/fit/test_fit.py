@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 from tests.simulated import campaign, more_of
 
 from truearm.engine.data.dataset import Dataset
@@ -273,13 +273,13 @@ def standing_still(twin: Twin, data: Dataset, joints: list[int]) -> Dataset:
 
 def test_too_few_equations_without_priors_are_refused_and_bounds_that_a_held_parameter_cannot_keep() -> None:
     _, data = campaign("irb120", 4, 0.0, 2)
-    with refused("fewer equations than unknowns", "36 equations for 40 unknown", "at least 14", "`redundancy=prior`"):
+    with refusing("fewer equations than unknowns", "36 equations for 40 unknown", "at least 14", "`redundancy=prior`"):
         identify(load_robot("irb120"), data, GEOMETRIC, redundancy="drop")
     _, data = campaign("irb120", 40, 0.05e-3, 2)
     bounds = Bounds.model_validate(
         {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}, "between": {"d_3": [1, 2]}}
     )
-    with refused("my.yaml, d_3: the bounds exclude the nominal value of a redundant"):
+    with refusing("my.yaml, d_3: the bounds exclude the nominal value of a redundant"):
         identify(load_robot("irb120"), data, GEOMETRIC, redundancy="drop", bounds=bounds, bounds_file="my.yaml")
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 from tests.simulated import campaign
 
 from truearm.engine.data.dataset import Dataset
@@ -63,7 +63,7 @@ def test_a_calibrated_arm_is_placed_to_its_noise() -> None:
 
 def test_data_without_positions_are_refused() -> None:
     _, data = campaign("irb120", 5, 0.0, 0)
-    with refused("twin: there is no position reading", "Fill in x, y and z"):
+    with refusing("twin: there is no position reading", "Fill in x, y and z"):
         initial_frames(load_robot("irb120"), replace(data, position=np.full_like(data.position, np.nan)))
 
 

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from papers.katana.tilting import twin as tilting_twin
 from truearm.engine.base.errors import InputError
@@ -249,7 +249,7 @@ def test_a_closed_loop_names_what_joints_that_never_moved_leave_open(device: str
 def test_postures_that_are_all_alike_or_too_few_are_refused(device: str) -> None:
     _, data = read_by(device, count=12)
     alike = replace(data, joints=np.tile(data.joints[:1], (12, 1)))
-    with refused("too few or too much alike; got '12 postures that determine ", of=device):
+    with refusing("too few or too much alike; got '12 postures that determine ", of=device):
         start_from_readings(NOMINAL, alike)
     with pytest.raises(InputError, match=r"measured too few times|too few or too much alike"):
         start_from_readings(NOMINAL, data.of_configurations([0, 1]))
@@ -257,10 +257,10 @@ def test_postures_that_are_all_alike_or_too_few_are_refused(device: str) -> None
 
 def test_strings_and_fixtures_that_say_too_little_are_refused() -> None:
     _, data = read_by("strings")
-    with refused("no target was measured from enough known points", "three known fixtures"):
+    with refusing("no target was measured from enough known points", "three known fixtures"):
         start_from_readings(NOMINAL, strings_of(data, (0, 1)))
     _, data = read_by("ballbar")
-    with refused("ballbar, fixture cup_2: a fixture was measured too few times", "0 readings"):
+    with refusing("ballbar, fixture cup_2: a fixture was measured too few times", "0 readings"):
         start_from_readings(NOMINAL, data.of_readings(data.against != 1))
     few = data.against.copy()
     few[0] = len(data.fixtures)
@@ -279,14 +279,14 @@ def test_planes_that_are_points_too_or_whose_place_is_known_are_refused() -> Non
     assert data.height is not None
     height, distance = data.height.copy(), np.full(len(data.height), np.nan)
     distance[::2], height[::2] = 0.3, np.nan
-    with refused("fixture plate_level: the readings disagree", "got 'plane and point'"):
+    with refusing("fixture plate_level: the readings disagree", "got 'plane and point'"):
         start_from_readings(NOMINAL, replace(data, height=height, distance=distance))
     position = np.array([[0.3, 0.0, 0.1]])
     place = recorded(NOMINAL, "known", np.zeros((1, 6)), [0], ["plate_level"], position=position, sigma=1e-5)
     away = replace(place, targets=("peg",), fixtures=("plate_level",), fixture=np.array([0]))
     away = replace(away, position=np.full((1, 3), np.nan), distance=np.array([0.2]))
     for known in (place, away):
-        with refused("fixture plate_level: a plane has no place and no distance"):
+        with refusing("fixture plate_level: a plane has no place and no distance"):
             start_from_readings(NOMINAL, replace(data, setup=known))
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 from tests.sampled_arm import sampled_room
 
 from truearm.engine.base.errors import InputError
@@ -104,7 +104,7 @@ def test_the_base_column_may_stand_on_a_table_and_not_in_a_box() -> None:
     assert check.room(np.zeros((1, 6)))[0] > 0.1
     assert set(check.kept(np.zeros((1, 6)))) == {"floor", "keep_out bench", "links"}
     box = KeepOut("wall", np.array([-np.inf, -0.1, -0.2]), np.array([0.1, 0.1, 0.2]))
-    with refused("keep_out, wall", "got 'x -inf to 100, y -100 to 100", parameter="constraints"):
+    with refusing("keep_out, wall", "got 'x -inf to 100, y -100 to 100", parameter="constraints"):
         CollisionCheck(robot, Cell(boxes=(box,)))
 
 
@@ -146,18 +146,18 @@ def test_safe_configurations_and_limits_without_room_are_refused() -> None:
     robot = arm()
     low, high = joint_window(robot)
     lid = KeepOut("lid", np.array([-2.0, -2.0, 0.32]), np.array([2.0, 2.0, 3.0]))
-    with refused("no configuration was found in which the arm keeps clear", "the box 'lid'"):
+    with refusing("no configuration was found in which the arm keeps clear", "the box 'lid'"):
         safe_configuration(CollisionCheck(robot, Cell(boxes=(lid,))), low, high)
     check = CollisionCheck(robot, Cell())
     for degrees, words in (
         ([0, 0, 0, 0, 0, 200], ["joint 6 of the safe configuration is not where the plan keeps it; got '200 deg'"]),
         ([0, 90, 0, 0, 90, 0], ["the safe configuration is not clear", "the floor: 0.0 mm"]),
     ):
-        with refused(*words, parameter="home"):
+        with refusing(*words, parameter="home"):
             checked_home(check, np.deg2rad(degrees), low, high)
     low, high = np.deg2rad([[0.0, 85, 0, 0, 80, 0], [0.0, 90, 0, 0, 90, 0]])
     narrow = WayFinder(check, finder(robot, Cell()).home, low, high)
-    with refused("no configuration in which the arm keeps clear", "rejected by floor", parameter="clearance"):
+    with refusing("no configuration in which the arm keeps clear", "rejected by floor", parameter="clearance"):
         drawn_clear(narrow, 10, np.zeros(6), np.random.default_rng(0))
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_frame, random_robot
+from tests.expecting import refusing
 
 import truearm
 from truearm.engine.robot.balancers import Anchor, Balancer
@@ -234,13 +234,13 @@ def test_exports_carry_balancers(tmp_path: Path) -> None:
     ],
 )
 def test_balancer_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, parts: list[str]) -> None:
-    with refused("balancers[1]", *parts):
+    with refusing("balancers[1]", *parts):
         arm(tmp_path, ARM.replace("PULL", PULL).replace(old, new, 1))
 
 
 def test_two_balancers_of_one_name_are_refused(tmp_path: Path) -> None:
     text = ARM.replace("PULL", PULL)
-    with refused("balancers[2]", "same name; got 'spring'", "balancers[1] has it too"):
+    with refusing("balancers[2]", "same name; got 'spring'", "balancers[1] has it too"):
         arm(tmp_path, text + text.splitlines(keepends=True)[-1])
     assert len(arm(tmp_path, text + text.splitlines()[-1].replace("name: spring, ", "")).balancers) == 2
 
@@ -411,5 +411,5 @@ joints:
 def test_bearing_that_cannot_be_is_refused(tmp_path: Path, bearing: str, sliding: str, parts: list[str]) -> None:
     path = tmp_path / "robot.yaml"
     path.write_text(SLIDER.replace("BEARING", bearing).replace("SLIDING", sliding))
-    with refused(*parts):
+    with refusing(*parts):
         read_robot(path)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import AS_THE_MODEL, Controller
@@ -113,7 +113,7 @@ def test_unknown_pulses_are_refused() -> None:
     for pulses, missing in (((), "joint 1, 2, 3"), ((1.0, None, 2.0), "joint 2"), ((None, 1.0, None), "joint 1, 3")):
         controller = Controller(pulses=pulses)
         for convert in (controller.to_pulses, controller.from_pulses):
-            with refused(f"{missing}: the number of motor pulses", of=pulses):
+            with refusing(f"{missing}: the number of motor pulses", of=pulses):
                 convert(np.zeros((2, 3)))
 
 
@@ -151,7 +151,7 @@ def test_unknown_pulses_are_refused() -> None:
     ],
 )
 def test_refused(entry: str, parts: list[str], tmp_path: Path) -> None:
-    with refused("robot.yaml", *parts):
+    with refusing("robot.yaml", *parts):
         read(tmp_path, f"  {entry}\n" if entry.startswith(("base", "flange", "tool")) else f"  joints: [{entry}]\n")
 
 

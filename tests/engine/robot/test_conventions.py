@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_robot, random_unit
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.conventions import CONVENTIONS, convention
@@ -192,7 +192,7 @@ EXPONENTIALS = "product-of-exponentials"
 def test_rows_that_describe_no_joint_are_refused(tmp_path: Path, name: str, entries: str, parts: list[str]) -> None:
     path = tmp_path / "robot.yaml"
     path.write_text(f"{HEAD}convention: {name}\njoints:\n  - {{{entries}}}\n", encoding="utf-8")
-    with refused("robot.yaml, joints[1]", *parts):
+    with refusing("robot.yaml, joints[1]", *parts):
         read_robot(path)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_frame, random_robot
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array, Chain
 from truearm.engine.robot.conventions import CONVENTIONS
@@ -58,7 +58,7 @@ def loads_along_axes(robot: Robot, q: Array) -> Array:
 
 def test_every_convention_can_be_converted_to_and_no_other() -> None:
     assert set(CONVERSIONS) == {c.name for c in CONVENTIONS}
-    with refused("there is no such convention", "allowed: standard-dh", "Did you mean s-model"):
+    with refusing("there is no such convention", "allowed: standard-dh", "Did you mean s-model"):
         converted(load_robot("irb120"), "s_model")
 
 
@@ -203,5 +203,7 @@ def test_axes_close_to_parallel_get_a_beta_and_others_a_common_normal() -> None:
 def test_nearly_parallel_axes_have_no_common_normal_to_write_down() -> None:
     robot = load_robot("irb120").with_values({"beta_3": np.radians(0.01)})
     for name in COMMON_NORMALS:
-        with refused("axes of two joints are nearly parallel", "axis_2 and axis_3, 0.01 deg", "Hayati's beta", of=name):
+        with refusing(
+            "axes of two joints are nearly parallel", "axis_2 and axis_3, 0.01 deg", "Hayati's beta", of=name
+        ):
             converted(robot, name)

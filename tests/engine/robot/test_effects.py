@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 import truearm
 from truearm.engine.robot.balancers import Anchor, Balancer
@@ -214,7 +214,7 @@ def test_tilts_under_their_own_loads_are_those_of_the_variables() -> None:
 def test_variables_of_another_number_are_refused() -> None:
     robot = load_robot("irb120").with_effects(["bearing-compliance"])
     for variables in (np.zeros((6, 5)), np.zeros(23)):
-        with refused("wrong number of variables", "allowed: (23, n)"):
+        with refusing("wrong number of variables", "allowed: (23, n)"):
             robot.joints_of(variables)
 
 
@@ -263,7 +263,7 @@ def test_only_what_can_be_negative_may_be_stated_so(effect: type[Effect], tmp_pa
         negative = replace(robot.parameters[own.name], **{field: -1e-5})  # type: ignore[arg-type]
         (tmp_path / "robot.yaml").write_text(robot_text(robot.with_parameters([negative])))
         if effect.non_negative:
-            with refused(f"{own.name}.{field}: no joint has a negative one", "allowed: 0 or more"):
+            with refusing(f"{own.name}.{field}: no joint has a negative one", "allowed: 0 or more"):
                 read_robot(tmp_path / "robot.yaml")
         else:
             assert getattr(read_robot(tmp_path / "robot.yaml").parameters[own.name], field) == pytest.approx(-1e-5)
@@ -463,7 +463,7 @@ SINGLE = "parameters: {curve_sin1_2: {unit: deg, nominal: 0, value: VALUE, prior
 def test_a_wrong_entry_is_refused(tmp_path: Path, old: str, new: str, told: list[str]) -> None:
     text = small_file(lambda text: text.replace(old, new)).replace("VALUE", "0").replace("SHARE", "0.9")
     (tmp_path / "robot.yaml").write_text(text)
-    with refused(*told):
+    with refusing(*told):
         read_robot(tmp_path / "robot.yaml")
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_effects import NAMES as EVERY_EFFECT
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects import EFFECTS
@@ -250,7 +250,7 @@ def test_what_is_none_is_refused_with_its_parameter() -> None:
     ]
     for parameter, call, values in wrong:
         for value in values:
-            with refused(parameter=parameter, of=f"{parameter} {value!r}"):
+            with refusing(parameter=parameter, of=f"{parameter} {value!r}"):
                 call(value)
 
 
@@ -266,7 +266,7 @@ def test_misspelt_names_are_offered() -> None:
         ("base_x", lambda: robot.with_values({"base_xx": 0.0})),
     ]
     for meant, call in calls:
-        with refused(f"Did you mean {meant}", of=meant):
+        with refusing(f"Did you mean {meant}", of=meant):
             call()
 
 
@@ -281,7 +281,7 @@ def test_payloads_are_arrays_or_texts_in_which_zero_needs_no_unit() -> None:
     assert Payload.of_text("300g,0.0,-0,0.1m") == Payload(0.3, (0.0, 0.0, 0.1))
     assert Payload.of_text("0,0,0,0") == Payload(0.0, (0.0, 0.0, 0.0))
     for text in ("3kg,0,0,120", "3,0,0,120mm", "3kg,0kg,0,120mm", "3kg,0,,120mm", "3kg,0 cm,0,120mm"):
-        with refused("unit", of=text):
+        with refusing("unit", of=text):
             Payload.of_text(text)
 
 

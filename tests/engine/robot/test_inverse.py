@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_effects import NAMES, loaded_arm
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.branches import BRANCHES, BranchRule, branch_rule
@@ -170,7 +170,7 @@ def test_branches_that_have_no_names() -> None:
     for robot in (load_robot("katana450"), seven_axes()):
         assert branch_rule(robot) is None
         p, R = robot.world_poses(np.zeros((1, len(robot.joints))))
-        with refused("have no names", of=robot.name):
+        with refusing("have no names", of=robot.name):
             inverse(robot, p, R, branch="front-up-noflip")
 
 
@@ -410,10 +410,10 @@ def test_refusals() -> None:
         ("have no names", P, R, {"branch": "all", "orientation": "free"}),
     ]
     for words, p, r, options in wrong:
-        with refused(words, of=options):
+        with refusing(words, of=options):
             inverse(load_robot("irb120"), p, r, **options)
     short = replace(sliding(), joints=sliding().joints[:2])
-    with refused("three joints or more"):
+    with refusing("three joints or more"):
         inverse(short, P, orientation="free")
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_frame, random_robot, random_unit
+from tests.expecting import refusing
 from tests.pinocchio_oracle import Body, PinocchioChain
 
 from truearm import InputError
@@ -279,7 +279,7 @@ def test_further_variables_of_the_chain_are_no_joints() -> None:
 
 def test_array_of_another_shape_is_refused() -> None:
     for name, shape in (("velocity", (7, 6)), ("acceleration", (5, 7)), ("wrench", (7, 6))):
-        with refused(name, "irb120", str(shape), "(6, 7)", of=name):
+        with refusing(name, "irb120", str(shape), "(6, 7)", of=name):
             joint_loads(load_robot("irb120"), np.zeros((6, 7)), **{name: np.zeros(shape)})
 
 
@@ -370,9 +370,9 @@ def test_what_is_no_wrench_is_refused() -> None:
         (80, "a wrench belongs here"),
     ]
     for given, said in wrong:
-        with refused(said, parameter="wrench", of=given):
+        with refusing(said, parameter="wrench", of=given):
             Wrench.of(given)
-    with refused("no frame of this name", "allowed: base, tool, world, controller"):
+    with refusing("no frame of this name", "allowed: base, tool, world, controller"):
         Wrench(FORCE, MOMENT, "tol")  # type: ignore[arg-type]
 
 
@@ -494,9 +494,9 @@ def test_more_than_the_rated_load_is_refused() -> None:
     robot = load_robot("irb120")
     assert robot.rated_load == 3.0
     assert robot.with_wrench(Wrench((0.0, 29.4, 0.0))).wrench is not None
-    with refused("force is larger than irb120 is rated for; got '29.5 N'", "29.42 N"):
+    with refusing("force is larger than irb120 is rated for; got '29.5 N'", "29.42 N"):
         robot.with_wrench(Wrench((0.0, 29.5, 0.0)))
-    with refused("moment is larger than irb120 is rated for; got '40 N m'"):
+    with refusing("moment is larger than irb120 is rated for; got '40 N m'"):
         robot.with_wrench(Wrench((0.0, 0.0, 0.0), (0.0, 0.0, 40.0)))
     unknown = replace(robot, rated_load=None)
     assert unknown.with_wrench(Wrench((0.0, 500.0, 0.0))).wrench is not None
@@ -516,7 +516,7 @@ def test_nothing_is_taken_away_by_none_or_zero() -> None:
 def test_no_file_holds_what_acts_on_the_tool() -> None:
     robot = load_robot("irb120").with_wrench(Wrench((0.0, 5.0, 0.0)))
     for written in (robot_text, lambda robot: export(robot, "json")):
-        with refused("no file of a robot holds an external force"):
+        with refusing("no file of a robot holds an external force"):
             written(robot)
 
 

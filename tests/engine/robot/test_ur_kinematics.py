@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests import ur_controller as ur
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.library import load_robot
@@ -80,13 +80,13 @@ def test_poses_are_those_of_the_controllers_table_and_frames_lie_beside_the_nomi
 
 def test_a_file_of_another_type_or_kind_is_refused(tmp_path: Path) -> None:
     for conf, robot in ((ur.UR10_CONF, "ur5e"), (ur.UR3E_CONF, "ur5"), (ur10e_conf(), "ur3e")):
-        with refused("another type of robot; got 'a flange ", " mm from that of ur", "allowed: 20 mm", of=robot):
+        with refusing("another type of robot; got 'a flange ", " mm from that of ur", "allowed: 20 mm", of=robot):
             refuse_far(made(tmp_path, conf, robot), load_robot(robot), "calibration.conf")
     for robot in ("irb120", "li3", "kr5"):
         with pytest.raises(InputError, match=r"another kind is given|must have the table and the frames"):
             made(tmp_path, ur.UR10_CONF, robot)
     for robot in ("irb120", "li3", "katana450"):
-        with refused("no arm of the kind that the format describes", of=robot):
+        with refusing("no arm of the kind that the format describes", of=robot):
             exported(load_robot(robot), "ur-kinematics")
 
 
@@ -156,13 +156,13 @@ def test_a_tilted_flange_is_said_to_be_left_out() -> None:
 def test_a_damaged_file_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
     text = re.sub(old, new, ur.UR10_CONF, count=1)
     assert text != ur.UR10_CONF
-    with refused(said):
+    with refusing(said):
         read_kinematics(written(tmp_path, text))
 
 
 def test_a_damaged_file_of_the_ros_driver_is_refused(tmp_path: Path) -> None:
     for old, new in (("wrist_3", "wrist_4"), ("hash", "hush"), ("yaw: 1.5413963267648517e-05", "yaw: east")):
-        with refused("ros.yaml, kinematics", of=new):
+        with refusing("ros.yaml, kinematics", of=new):
             read_kinematics(written(tmp_path, ROS.replace(old, new), "ros.yaml"))
     # As a copy that broke off in its last number leaves it.
     rows = re.findall(r"  (\w+): \{([^}]*)\}", ROS)
@@ -170,7 +170,7 @@ def test_a_damaged_file_of_the_ros_driver_is_refused(tmp_path: Path) -> None:
     broken = re.sub(r"yaw: -3\.1\d+\n$", "yaw: -3.1", "kinematics:\n" + "".join(lines))
     assert broken.endswith("yaw: -3.1")
     for text in (ROS.partition("  hash")[0], ROS.partition("  hash")[0] + "  hash: ''\n", broken):
-        with refused("ros.yaml, kinematics: the hash is missing, so the file is not whole", of=text[-30:]):
+        with refusing("ros.yaml, kinematics: the hash is missing, so the file is not whole", of=text[-30:]):
             read_kinematics(written(tmp_path, text, "ros.yaml"))
 
 
@@ -178,7 +178,7 @@ def test_what_is_no_kinematics_file_is_refused_and_a_file_of_blanks_at_once(tmp_
     # Of so many blank lines each was once read again from every one before it, which would take ten minutes.
     blanks = ("\n" * 300_000 + "x: 1\n", "delta_" + "a" * 300_000, "delta_a" + " " * 300_000 + "b")
     for text in ("a,b,c\n1,2,3\n", "truearm: truearm-robot/1\nname: x\n", *blanks):
-        with refused("some.yaml", of=text[:20]):
+        with refusing("some.yaml", of=text[:20]):
             read_kinematics(written(tmp_path, text, "some.yaml"))
 
 
@@ -197,7 +197,7 @@ def test_a_flange_that_is_turned_far_is_refused(tmp_path: Path) -> None:
     assert np.degrees(mean_angle(plain, type_)) == pytest.approx(0.362, abs=1e-3)
     assert np.degrees(mean_angle(turned, type_)) == pytest.approx(np.degrees(0.09), abs=0.1)
     refuse_far(plain, type_, "calibration.conf")
-    with refused("a flange turned by 5.18 deg from that of ur10 on average", "allowed: 1 deg"):
+    with refusing("a flange turned by 5.18 deg from that of ur10 on average", "allowed: 1 deg"):
         refuse_far(turned, type_, "calibration.conf")
 
 
@@ -207,7 +207,7 @@ def test_joint_zeros_that_cancel_at_the_flange_are_refused_at_the_link() -> None
     arm = type_.with_values({"theta_offset_2": 0.045, "theta_offset_3": -0.045})
     assert mean_angle(arm, type_) < 1e-6
     assert mean_distance(arm, type_) < 0.02
-    with refused("does not come to lie beside the nominal one", "2.58 deg", "allowed: 50 mm, 2 deg", "link 2"):
+    with refusing("does not come to lie beside the nominal one", "2.58 deg", "allowed: 50 mm, 2 deg", "link 2"):
         refuse_far(arm, type_, "calibration.conf")
 
 
@@ -306,7 +306,7 @@ def test_rows_of_another_arm_in_a_robot_file_are_refused(tmp_path: Path) -> None
         rows[row][column] = rows[row].get(column, 0.0) + wrong
         with (tmp_path / "arm.yaml").open("w") as stream:
             yaml.dump(content, stream)
-        with refused("arm.yaml, controller.kinematics: ", said, of=column):
+        with refusing("arm.yaml, controller.kinematics: ", said, of=column):
             read_robot(tmp_path / "arm.yaml")
 
 

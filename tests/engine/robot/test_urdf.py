@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_robot
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array, Chain
 from truearm.engine.robot.conventions import CONVENTIONS
@@ -366,14 +366,14 @@ REFUSED: list[tuple[bytes, tuple[str, ...]]] = [
 
 def test_file_is_refused(tmp_path: Path) -> None:
     for content, parts in REFUSED:
-        with refused(str(tmp_path), *parts, of=parts):
+        with refusing(str(tmp_path), *parts, of=parts):
             read(content, tmp_path)
     for tip, parts in (("tool", ("no link of this name", "'tool'")), ("world", ("no joint moves", "root world"))):
-        with refused("robot.urdf", *parts, of=tip):
+        with refusing("robot.urdf", *parts, of=tip):
             read(UR_LIKE, tmp_path, tip)
-    with refused("'my robot' and 'cell 3'", "Rename the file"):
+    with refusing("'my robot' and 'cell 3'", "Rename the file"):
         read_urdf(written(simple(ARM, links=AB, name="my robot"), tmp_path, "cell 3.urdf"))
-    with refused("no such file"):
+    with refusing("no such file"):
         read_urdf(tmp_path / "none.urdf")
 
 
@@ -486,9 +486,9 @@ def test_another_robots_file_is_not_calibrated(tmp_path: Path) -> None:
         (UR_LIKE.replace(b'"0 0 1"/>', b'"0 0 -1"/>', 1), "axis_z of joint shoulder_pan_joint differs"),
         (slides, "joint elbow_joint is prismatic"),
     ):
-        with refused("not the one this robot was read from", said, of=said):
+        with refusing("not the one this robot was read from", said, of=said):
             calibrated_urdf(content, robot)
-    with refused("irb120 is of convention modified-hayati", "a new URDF can be written"):
+    with refusing("irb120 is of convention modified-hayati", "a new URDF can be written"):
         calibrated_urdf(UR_LIKE, load_robot("irb120"))
 
 
@@ -658,5 +658,5 @@ def test_new_file_is_refused() -> None:
         ((Joint("A", "revolute", {}), Joint("A", "revolute", {})), ("two joints of one name", "'A'")),
         ((Joint("tool0_joint", "revolute", {}),), ("two joints of one name", "'tool0_joint'")),
     ):
-        with refused(*parts, of=parts):
+        with refusing(*parts, of=parts):
             urdf_text(Robot("arm", "", "", "standard-dh", joints))

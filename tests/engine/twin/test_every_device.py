@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
@@ -103,7 +103,7 @@ def test_names_are_unlike_and_every_device_says_what_it_is() -> None:
 
 
 def test_an_unknown_device_is_refused() -> None:
-    with refused("no device of this name; got 'balbar'; allowed: tracker, ", "mean ballbar"):
+    with refusing("no device of this name; got 'balbar'; allowed: tracker, ", "mean ballbar"):
         named_device("balbar")
 
 
@@ -375,14 +375,14 @@ def cramped(robot: Robot) -> Robot:
 def test_arms_out_of_reach_or_too_far_from_the_nominal_robot_are_refused() -> None:
     twin = truth_twin(nominal("irb120"), "nominal", np.random.default_rng(0))
     far = replace(twin, robot=twin.robot.with_frames(Transform((9.0, 0.0, 0.0)), {}))
-    with refused("measurement-arm sees too few configurations of irb120", "got '0 among"):
+    with refusing("measurement-arm sees too few configurations of irb120", "got '0 among"):
         measured_with(named_device("measurement-arm"), nominal("irb120"), far, 5, np.random.default_rng(0))
     for name in ("ballbar", "gauges", "plane", "two-spheres"):
-        with refused(f"{name}: irb120 does not reach ", " of 9 places within reach'; allowed: 3 or"):
+        with refusing(f"{name}: irb120 does not reach ", " of 9 places within reach'; allowed: 3 or"):
             measured_with(named_device(name), cramped(nominal("irb120")), twin, 3, np.random.default_rng(0))
     short = replace(twin, robot=twin.robot.with_values({"a_2": 0.02, "d_4": 0.02}))
     for name in ("ballbar", "gauges", "point", "touch-up"):
-        with refused("irb120: the tool ", "place of measurement", "too far from", of=name):
+        with refusing("irb120: the tool ", "place of measurement", "too far from", of=name):
             measured_with(named_device(name), nominal("irb120"), short, 10, np.random.default_rng(0))
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_loads import by_pinocchio, motion, random_link, random_triple
+from tests.expecting import refusing
 
 from truearm.engine.data import inclinations as inclinometer
 from truearm.engine.robot.chain import Array
@@ -306,13 +306,13 @@ def test_a_truth_carries_the_tool_unless_the_robot_carries_something() -> None:
 
 def test_joints_and_shapes_that_are_not_there_are_refused() -> None:
     for number in (0, 3):
-        with refused(f"joint {number} of the twin of planar: the robot has no such", "1 to 2"):
+        with refusing(f"joint {number} of the twin of planar: the robot has no such", "1 to 2"):
             Twin(planar(0.5, 0.4), {number: JointTruth()})
     twin = Twin(planar(0.5, 0.4))
     for name in ("approach", "temperature", "wrench", "velocity", "acceleration"):
-        with refused(name, "shape (2, 7)"):
+        with refusing(name, "shape (2, 7)"):
             measure(twin, np.zeros((3, 2)), 0.0, RNG(0), **{name: np.zeros((2, 7))})  # type: ignore[arg-type]
-    with refused("joint positions; got 'an array of shape (3, 1)'; allowed: (3, 2)"):
+    with refusing("joint positions; got 'an array of shape (3, 1)'; allowed: (3, 2)"):
         measure(twin, np.zeros((3, 1)), 0.0, RNG(0))
 
 
@@ -322,7 +322,7 @@ def test_only_joints_about_z_tilt() -> None:
     row = {"axis_x": 0.0, "axis_y": 1.0, "axis_z": 0.0}
     about_y = Robot("arm", "", "", "urdf", (Joint("J1", "revolute", row),))
     for robot in (slide, about_y):
-        with refused("only a joint that turns about its frame's z can tilt", of=robot.name):
+        with refusing("only a joint that turns about its frame's z can tilt", of=robot.name):
             Twin(robot, loose)
     about_z = replace(about_y, joints=(Joint("J1", "revolute", {**row, "axis_y": 0.0, "axis_z": 1.0}),))
     assert Twin(about_z, loose).joints == loose
@@ -380,7 +380,7 @@ def test_the_twin_computes_every_effect_and_refuses_another(monkeypatch: pytest.
             return (self.parameter("wobble_1", "rad", 1e-3),)
 
     monkeypatch.setattr("truearm.engine.robot.robot_data.EFFECTS", (Wobble,))
-    with refused("does not compute this joint effect; got 'wobble_1'"):
+    with refusing("does not compute this joint effect; got 'wobble_1'"):
         joint_truths(replace(load_robot("irb120"), effect_names=("wobble",)))
 
 

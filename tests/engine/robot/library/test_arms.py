@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests.engine.robot.library import outside, outside_poses
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.robot.controller import AS_THE_MODEL
 from truearm.engine.robot.conventions.convention import parallel_joints_without_beta
@@ -260,7 +260,7 @@ def test_gofa_reaches_as_far_as_its_name_says() -> None:
 def test_a_reach_that_is_none_is_refused(entry: str, said: str, tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(re.sub("(?m)^reach: .*$", f"reach: {entry}", robot_text(load_robot("irb120"))), "utf-8")
-    with refused(said):
+    with refusing(said):
         read_robot(path)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 import truearm
 from truearm.engine.robot.library import close_names, library, load_robot, urdf_source
@@ -53,7 +53,7 @@ def test_a_close_name_is_refused_and_all_it_may_be_are_offered() -> None:
     ):
         assert close_names(text)[: len(offered)] == offered
         titles = [f"{name} ({load_robot(name).title})" for name in offered]
-        with refused(*titles or ["Run 'truearm robots'"], of=text):
+        with refusing(*titles or ["Run 'truearm robots'"], of=text):
             load_robot(text)
     assert len(close_names("ur")) == 8
 
@@ -66,7 +66,7 @@ def test_a_file_or_a_folder_that_is_not_there_is_said_to_be_so_and_no_robot_too(
         ("", "robot: no robot is given"),
         (" ", "robot: no robot is given"),
     ):
-        with refused(said, of=given):
+        with refusing(said, of=given):
             load_robot(given)
 
 
@@ -98,7 +98,7 @@ def test_the_list_is_narrowed() -> None:
     ],
 )
 def test_a_list_of_none_is_refused(given: dict[str, Any], parameter: str, words: str) -> None:
-    with refused(words, parameter=parameter):
+    with refusing(words, parameter=parameter):
         truearm.robots(**given)
 
 
@@ -147,5 +147,5 @@ def test_a_path_with_a_hash_is_a_path(tmp_path: Path) -> None:
     path.write_text(urdf_text(load_robot("li3"))[0])
     for text in (path, f"{path}#tool0"):
         assert len(load_robot(text).joints) == 3
-    with refused("there is no link of this name; got 'tool'"):
+    with refusing("there is no link of this name; got 'tool'"):
         load_robot(f"{path}#tool")

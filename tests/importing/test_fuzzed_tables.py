@@ -14,7 +14,7 @@ from tests.fuzz.mutations import ODD
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.units import as_number
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.data.readers.table import read_table
+from truearm.engine.data.readers.table import read_noting
 from truearm.importing.guess import guess_mapping
 
 #: How many tables; 2000 once in a while.
@@ -116,11 +116,11 @@ def finding(case: int, folder: Path) -> str:
     file, mapping = folder / "table.csv", folder / "map.yaml"
     mapping.write_text(table.mapping)
     file.write_text(table.sound)
-    sound = read_table(file, mapping)
+    sound = read_noting(file, mapping)[0]
     file.write_bytes(table.odd.encode("utf-8", "surrogateescape"))
     structure = any(sign in table.text for sign in (*SIGNS.values(), '"', "\n", "\r", "//"))
     try:
-        data = read_table(file, mapping)
+        data = read_noting(file, mapping)[0]
     except InputError as error:
         place = f"line {table.line}"
         cell = f"{place}, column {NAMES[table.column]}"
@@ -168,4 +168,4 @@ def test_odd_cells_of_a_workbook_are_refused_by_their_place(tmp_path: Path, plac
         book.active[place] = text
         book.save(tmp_path / "table.xlsx")
         with pytest.raises(InputError, match=f"Points!{place}: "):
-            read_table(tmp_path / "table.xlsx", tmp_path / "map.yaml")
+            read_noting(tmp_path / "table.xlsx", tmp_path / "map.yaml")

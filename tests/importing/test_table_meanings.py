@@ -12,7 +12,7 @@ from tests.engine.data.test_table import LONG, MAP, read
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import csv_text, read_csv
-from truearm.engine.data.readers.table import read_noting, read_table
+from truearm.engine.data.readers.table import read_noting
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_vector
 from truearm.importing.jobs import import_table
 
@@ -238,10 +238,10 @@ def test_joints_come_from_a_file_with_the_columns_of_the_canonical_csv(tmp_path:
     )
     other = tmp_path / "other.csv"
     other.write_text(joints.replace("axis", "joint"))
-    data = read_table(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)
+    data = read_noting(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)[0]
     assert data.joints_are == "model"
     with pytest.raises(InputError, match="the mapping says whose joint positions they are"):
-        read_table(tmp_path / "table.txt", tmp_path / "map.yaml", "controller", joints=other)
+        read_noting(tmp_path / "table.txt", tmp_path / "map.yaml", "controller", joints=other)
     with pytest.raises(InputError, match="the column configuration is missing"):
         read(tmp_path, LONG, mapping, joints.replace("configuration", "pose"))
     with pytest.raises(InputError, match=r"the configuration has no joints in .*column configuration"):
@@ -250,7 +250,7 @@ def test_joints_come_from_a_file_with_the_columns_of_the_canonical_csv(tmp_path:
         read(tmp_path, LONG.replace("a", "P001"), mapping, joints.replace("\na,", "\n1,"))
     (tmp_path / "map.yaml").write_text(MAP)
     with pytest.raises(InputError, match="takes the joint positions from the table itself") as refusal:
-        read_table(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)
+        read_noting(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)
     assert refusal.value.parameter == "joints_file"
 
 

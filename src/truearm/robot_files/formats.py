@@ -6,36 +6,27 @@ import ast
 import csv
 import io
 import json
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
-from pathlib import Path
 from textwrap import wrap
 from typing import Any, Final
 
 import numpy as np
 
 from truearm.engine.base.errors import InputError, did_you_mean
-from truearm.engine.base.files import read_text
-from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.base.units import (
-    ANGLE_UNITS,
-    LENGTH_UNITS,
     SHOWN_AS,
-    as_number,
-    checked_unit,
     from_si,
-    sized_si,
     to_si,
     without_mark,
     written,
 )
 from truearm.engine.robot.balancers import Balancer
 from truearm.engine.robot.chain import Array, Element, across, axis_of
-from truearm.engine.robot.conventions.convention import JOINT, JointKind
+from truearm.engine.robot.conventions.convention import JOINT
 from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.dh_table import DHRow, DHTable, TableConvention
 from truearm.engine.robot.effects.balancing import Balancing
@@ -44,7 +35,7 @@ from truearm.engine.robot.effects.joint_curve import JointCurve, curve_names
 from truearm.engine.robot.effects.linear_contact import LinearContactClearance
 from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.robot import Robot
-from truearm.engine.robot.transform import IDENTITY, Transform
+from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.robot.ur_kinematics import KINEMATICS_FILE, kinematics_text
 from truearm.engine.robot.urdf_tree import roll_pitch_yaw
 from truearm.engine.robot.urdf_writing import (
@@ -88,108 +79,6 @@ def complete_dh_csv(table: DHTable, comments: Sequence[str]) -> str:
     for name, place in (("base", table.base), ("flange", table.flange)):
         writer.writerow([name, *(repr(written(v, "mm")) for v in place.translation), *map(repr, place.quaternion)])
     return "".join(f"# {line}\n" for line in comments) + dh_csv(table) + "\n" + stream.getvalue()
-
-
-def read_dh_csv(path: Path, convention_name: TableConvention) -> DHTable:
-    """Read a DH table from a CSV file; its base and flange are the identity unless it gives them.
-
-    The columns are ``joint``, ``a [mm]``, ``alpha [deg]``, ``d [mm]`` and ``theta_offset [deg]``, in any
-    order and unit, ``beta [deg]`` in a Hayati table, and ``type`` where a joint slides. Behind the rows the frames
-    ``base`` and ``flange`` may stand, under the header ``frame,x [mm],y [mm],z [mm],qw,qx,qy,qz``.
-
-    Args:
-        convention_name: The form the numbers are in; no table says it of itself.
-    """
-    text = read_text(path)
-    refuse_beyond("entries", text.count("\n") + text.count("\r") + text.count(","), where=str(path))
-    uncommented = ("" if line.startswith("#") else line for line in text.splitlines())
-    try:
-        lines = [
-            (f"{path}, line {number}", [cell.strip() for cell in cells])
-            for number, cells in enumerate(csv.reader(uncommented), 1)
-            if any(cell.strip() for cell in cells)
-        ]
-    except csv.Error as error:
-        raise InputError(f"the table cannot be read ({error})", where=str(path)) from error
-    if not lines:
-        raise InputError("the file holds comments and no table", where=str(path))
-    known = _columns(convention_name)
-    columns = _header(lines[0][1], known, lines[0][0])
-    end = next((i for i, (_, cells) in enumerate(lines) if tuple(cells) == _FRAMES), len(lines))
-    if end == 1:
-        raise InputError("the table has no rows", where=str(path))
-    rows = []
-    for where, cells in lines[1:end]:
-        _count(cells, len(columns), where)
-        entry = dict(zip((name for name, _ in columns), cells, strict=True))
-        kind: JointKind = "prismatic" if entry.get("type") == "prismatic" else "revolute"
-        if entry.get("type", kind) != kind:
-            raise InputError(
-                "a joint has no such type", where=f"{where}, type", came=entry["type"], allowed="revolute, prismatic"
-            )
-        si = {name: _si(entry[name], unit, f"{where}, {name}") for name, unit in columns if unit}
-        rows.append(DHRow(entry["joint"], kind, **si))
-    table = DHTable(convention_name, tuple(rows), Transform(), Transform())
-    if end == len(lines):
-        return table
-    places = _frames(lines[end + 1 :], str(path))
-    return replace(table, base=places["base"], flange=places["flange"])
-
-
-def _header(cells: Sequence[str], known: dict[str, str], where: str) -> list[tuple[str, str]]:
-    """Return name and unit of each column; names without a unit have an empty one."""
-    columns = []
-    for cell in cells:
-        name, _, rest = cell.strip().partition("[")
-        name, unit = name.strip(), rest.removesuffix("]").strip()
-        if name in known:
-            unit = checked_unit(unit, LENGTH_UNITS if known[name] == "m" else ANGLE_UNITS, f"{where}, column {name}")
-        columns.append((name, unit))
-    names = [name for name, _ in columns]
-    needed = ["joint", *known]
-    if sorted(set(names) - {"type"}) != sorted(needed) or len(set(names)) < len(names):
-        raise InputError(
-            "these are not the columns of a DH table",
-            where=where,
-            came=", ".join(names),
-            allowed=f"{', '.join(needed)}, each once, with their units in brackets; and type",
-            cure="Separate the columns by commas.",
-        )
-    return columns
-
-
-def _frames(lines: Sequence[tuple[str, Sequence[str]]], path: str) -> dict[str, Transform]:
-    found = {}
-    for where, cells in lines:
-        _count(cells, len(_FRAMES), where)
-        x, y, z = (_si(cell, "mm", f"{where}, {axis}") for cell, axis in zip(cells[1:4], "xyz", strict=True))
-        w, i, j, k = (_si(cell, "1", f"{where}, quaternion") for cell in cells[4:])
-        if abs(math.hypot(w, i, j, k) - 1.0) > 1e-6:
-            raise InputError("a quaternion must have length 1", where=where, came=f"{math.hypot(w, i, j, k):.6g}")
-        found[cells[0]] = Transform((x, y, z), (w, i, j, k))
-    names = [cells[0] for _, cells in lines]
-    if sorted(names) != ["base", "flange"]:
-        raise InputError(
-            "these are not the frames of a table",
-            where=path,
-            came=", ".join(names) or "none",
-            allowed="base and flange, each once",
-        )
-    return found
-
-
-def _count(cells: Sequence[str], expected: int, where: str) -> None:
-    if len(cells) != expected:
-        raise InputError(
-            "the row does not have as many cells as the header", where=where, came=len(cells), allowed=str(expected)
-        )
-
-
-def _si(text: str, unit: str, where: str) -> float:
-    value = as_number(text)
-    if value is None:
-        raise InputError("a number belongs here", where=where, came=text)
-    return sized_si(value, unit, where, came=text)
 
 
 SCHEMA: Final = "truearm-model/1"

@@ -17,7 +17,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.data.readers.cells import column_letters
-from truearm.engine.data.readers.table import read_table
+from truearm.engine.data.readers.table import read_noting
 
 openpyxl = pytest.importorskip("openpyxl")
 NO_WORKBOOK = "cell.xlsx: this is no Excel workbook that can be read"
@@ -55,7 +55,7 @@ def written(folder: Path, change: Callable[[Any], None] = lambda sheet: None, ma
 
 
 def read(folder: Path, change: Callable[[Any], None] = lambda sheet: None, mapping: str = MAP) -> Dataset:
-    return read_table(*written(folder, change, mapping))
+    return read_noting(*written(folder, change, mapping))[0]
 
 
 def put(place: str, value: object) -> Callable[[Any], None]:
@@ -141,22 +141,22 @@ def test_what_is_no_workbook(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     table, mapping = written(tmp_path)
     for ending in (".xls", ".ods"):
         with refusing("workbooks of this kind are not read", "Save it as an Excel workbook"):
-            read_table(table.with_suffix(ending), mapping)
+            read_noting(table.with_suffix(ending), mapping)
     (tmp_path / "text.csv").write_text("a,b\n")
     with refusing("only workbooks have sheets"):
-        read_table(tmp_path / "text.csv", mapping)
+        read_noting(tmp_path / "text.csv", mapping)
     whole = table.read_bytes()
     for damaged in (b"a,b\n1,2\n", whole[:2000], whole[:600] + bytes(200) + whole[800:]):
         table.write_bytes(damaged)
         with refusing(NO_WORKBOOK):
-            read_table(table, mapping)
+            read_noting(table, mapping)
     with zipfile.ZipFile(table, "w", zipfile.ZIP_DEFLATED) as parts:
         parts.writestr("xl/workbook.xml", " " * 20_000_001)
     with refusing("the workbook is too large; got '20000001 bytes unpacked'"):
-        read_table(table, mapping)
+        read_noting(table, mapping)
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     with pytest.raises(InputError, match=r"openpyxl, and it is not installed.*pip install .truearm\[excel\]"):
-        read_table(table, mapping)
+        read_noting(table, mapping)
 
 
 def test_columns_have_letters_and_numbers_are_those_that_excel_holds(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_sheets_that_no_spreadsheet_writes(tmp_path: Path) -> None:
         table, mapping = written(tmp_path)
         changed(table, old, new)
         if not part:
-            assert read_table(table, mapping).configurations == 2, new
+            assert read_noting(table, mapping)[0].configurations == 2, new
             continue
         with refusing(part, of=new):
-            read_table(table, mapping)
+            read_noting(table, mapping)

@@ -20,7 +20,7 @@ from truearm.checking.check import check
 from truearm.engine.base.errors import Notice
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.changes import check_changes, find_change
+from truearm.engine.diagnose.changes import find_change, notices_of_change
 from truearm.engine.diagnose.gain import check_gain, signed_rank_probability
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
 from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
@@ -281,7 +281,9 @@ def honest() -> tuple[Twin, Dataset]:
 
 
 def told(data: Dataset, robot: str = "irb120") -> list[Notice]:
-    return check_changes(LeftOver.of(identify(load_robot(robot), data, named_model("geometric")), data))
+    left = LeftOver.of(identify(load_robot(robot), data, named_model("geometric")), data)
+    change = find_change(left)
+    return [] if change is None else notices_of_change(left, change)
 
 
 def moved_instrument(data: Dataset, shift: Array, turn: Array | None = None) -> Dataset:

@@ -17,7 +17,7 @@ from truearm.engine.motion.collisions import MARGIN, CollisionCheck
 from truearm.engine.motion.constraints import joint_window, on_principal_turn
 from truearm.engine.motion.home import checked_home, safe_configuration
 from truearm.engine.motion.touring import cell_notices, nearest_on, tour_of, unreached
-from truearm.engine.motion.ways import WayFinder, drawn_clear, touched
+from truearm.engine.motion.ways import WayFinder, drawn_clear
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
 from truearm.planning.choosing import with_targets
@@ -180,11 +180,10 @@ def test_a_way_goes_around_a_wall() -> None:
     assert brute.min() >= find.check.cell.clearance
     assert tour.room == pytest.approx(brute.min(), abs=0.02)
     assert tour.room >= find.check.cell.clearance + MARGIN
-    assert touched(find.check, stops) is None
-    move, room, words = touched(find.check, np.array([find.home, *q])) or (-1, 0.0, "")
-    assert move in (0, 1)
-    assert room < find.check.cell.clearance
-    assert "the box 'wall'" in words
+    straight = find.check.ways(np.array([find.home, q[0]]), q)
+    k = int(np.argmin(straight.room))
+    assert straight.room[k] < find.check.cell.clearance
+    assert "the box 'wall'" in find.check.words(int(straight.worst[k]))
 
 
 def test_a_configuration_behind_walls_is_refused_by_its_name() -> None:

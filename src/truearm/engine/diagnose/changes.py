@@ -211,12 +211,6 @@ def _judged(
     return criterion, Change(kind, what, first, share, tuple((-values).tolist()), chance)
 
 
-def check_changes(left: LeftOver) -> list[Notice]:
-    """Return a notice if something moved during the campaign."""
-    change = find_change(left)
-    return [] if change is None else notices_of_change(left, change)
-
-
 def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
     """Return what a fit leaves without configurations that are off one by one, and what moved during the others.
 

@@ -123,22 +123,6 @@ class WayFinder:
         return self._roomy
 
 
-def touched(check: CollisionCheck, joints: Array) -> tuple[int, float, str] | None:
-    """Return where a row of configurations ``(n, joints)``, driven one after the other, comes too near to something.
-
-    Returns:
-        The number of the move (0 from the first to the second), the room there [m], and what comes near what; None if
-        the clearance is kept all the way.
-    """
-    starts, ends = (joints[:-1], joints[1:]) if len(joints) > 1 else (joints, joints)
-    looked = check.ways(starts, ends)
-    failed = np.flatnonzero(looked.room < check.cell.clearance)
-    if not len(failed):
-        return None
-    k = int(failed[0])
-    return k, float(looked.room[k]), check.words(int(looked.worst[k]))
-
-
 #: So many times as many as are wanted are drawn at most, but no more than this where twice as many are enough.
 _TIMES: Final = 40
 _MOST: Final = 200_000

@@ -107,7 +107,9 @@ def _of_joints(content: MappingFile, mapping: Path) -> JointsEntry:
     return content.joints
 
 
-def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None) -> Dataset:
+def read_noting(
+    path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None
+) -> tuple[Dataset, tuple[Notice, ...]]:
     """Read any delimited text, or a sheet of a workbook, as its mapping file (schema ``truearm-mapping/1``) says.
 
     An empty cell is a missing reading; zeros are zeros. A second file with the joints is looked for beside
@@ -119,16 +121,12 @@ def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, jo
         joints_are: Whose joint positions they are; None for what the mapping says.
         joints: The file of the joints; None for the one that the mapping names.
 
+    Returns:
+        The data, and what they cannot hold of the table.
+
     Raises:
         InputError: If a file cannot be used, or the mapping says that the joint positions are another's.
     """
-    return read_with(_files(path, mapping, joints), joints_are)[0]
-
-
-def read_noting(
-    path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None
-) -> tuple[Dataset, tuple[Notice, ...]]:
-    """Read a table as :func:`read_table` does, and say what data cannot hold of it."""
     return read_with(_files(path, mapping, joints), joints_are)
 
 
@@ -243,7 +241,7 @@ def _mapped(
 
 
 def files_read(path: Path, mapping: Path, joints: Path | None = None) -> tuple[Path, ...]:
-    """Return all files that :func:`read_table` reads."""
+    """Return all files that :func:`read_noting` reads."""
     return _files(path, mapping, joints).read
 
 

@@ -259,15 +259,15 @@ def lines_of(blocks: Iterable[Block], *, details: bool = True) -> list[str]:
 
 def held_by(blocks: Iterable[Block]) -> dict[str, Any]:
     """Return what JSON holds of blocks."""
-    held: dict[str, Any] = {}
+    summary: dict[str, Any] = {}
     for block in blocks:
         if isinstance(block, Words | Table):
-            held |= block.held
+            summary |= block.held
         elif isinstance(block, Under):
-            held[block.key] = held_by(block.blocks)
+            summary[block.key] = held_by(block.blocks)
         elif isinstance(block, Each):
-            held[block.key] = [held_by(entry) for entry in block.entries]
-    return held
+            summary[block.key] = [held_by(entry) for entry in block.entries]
+    return summary
 
 
 def _pictures(blocks: Sequence[Block]) -> Iterator[Picture]:

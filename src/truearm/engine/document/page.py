@@ -97,7 +97,7 @@ def with_code(text: str) -> Markup:
 def json_for_script(value: object) -> str:
     """Return JSON that can stand inside a script element whatever its texts hold."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    text = _LONG_WORD.sub(lambda found: shortened(found[0], LONGEST_WORD), text)
+    text = _LONG_WORD.sub(lambda match: shortened(match[0], LONGEST_WORD), text)
     return text.translate(_UNSAFE | {ord(c): f"\\\\u{ord(c):04x}" for c in TURNING})
 
 

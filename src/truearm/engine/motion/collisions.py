@@ -83,25 +83,25 @@ class Measure:
         if pairs:
             self._pairs = _Lines(
                 [k for k, _, _ in pairs],
-                [_between(one, other) for _, one, other in pairs],
-                [0.0 if _level(one, other) else one.capsule.gap + other.capsule.gap for _, one, other in pairs],
-                [one.capsule.radius + other.capsule.radius for _, one, other in pairs],
+                [_between(piece, other) for _, piece, other in pairs],
+                [0.0 if _level(piece, other) else piece.capsule.gap + other.capsule.gap for _, piece, other in pairs],
+                [piece.capsule.radius + other.capsule.radius for _, piece, other in pairs],
             )
 
     def __call__(self, points: Array) -> Array:
         """Return the rooms at points ``(points, 3, n)`` [m], ``(rooms, n)``; below zero they touch."""
-        found = np.empty((self.count, points.shape[2]))
+        distances = np.empty((self.count, points.shape[2]))
         if self._floor is not None:
             rows, point, radius = self._floor
             assert self.cell.floor is not None
-            found[rows] = points[point, 2] - radius[:, None] - self.cell.floor
+            distances[rows] = points[point, 2] - radius[:, None] - self.cell.floor
         for number, lines in self._boxes.items():
             box = self.cell.boxes[number]
-            found[lines.rows] = lines.least(box_distance(*lines.ends(points, 0), box.low, box.high))
+            distances[lines.rows] = lines.least(box_distance(*lines.ends(points, 0), box.low, box.high))
         if self._pairs is not None:
             lines = self._pairs
-            found[lines.rows] = lines.least(segment_distance(*lines.ends(points, 0), *lines.ends(points, 1)))
-        return found
+            distances[lines.rows] = lines.least(segment_distance(*lines.ends(points, 0), *lines.ends(points, 1)))
+        return distances
 
 
 _Line = tuple[int, int, float, float]
@@ -136,17 +136,17 @@ class _Lines:
         return np.asarray(np.sqrt(np.maximum(nearest**2 - self._square, 0.0)) - self._radius)
 
 
-def _level(one: Piece, other: Piece) -> bool:
+def _level(piece: Piece, other: Piece) -> bool:
     """Return whether plates lie along the same axes, so that they are as far apart as lines across these."""
-    a, b = one.capsule, other.capsule
+    a, b = piece.capsule, other.capsule
     return a.across is not None and b.across is not None and a.joints == b.joints
 
 
-def _between(one: Piece, other: Piece) -> list[tuple[_Line, ...]]:
-    a, b = one.capsule.across, other.capsule.across
-    if a is not None and b is not None and _level(one, other):
-        return [((*a, one.first, one.last), (*b, other.first, other.last))]
-    return [(a_line, b_line) for a_line in one.lines() for b_line in other.lines()]
+def _between(piece: Piece, other: Piece) -> list[tuple[_Line, ...]]:
+    a, b = piece.capsule.across, other.capsule.across
+    if a is not None and b is not None and _level(piece, other):
+        return [((*a, piece.first, piece.last), (*b, other.first, other.last))]
+    return [(a_line, b_line) for a_line in piece.lines() for b_line in other.lines()]
 
 
 LINKS: Final = "links"
@@ -238,15 +238,15 @@ class CollisionCheck:
         for name in names:
             if name not in self._measures:
                 self._measures[name] = Measure([room for room in self._rooms if room.what == name], self.cell)
-        found = [np.zeros((0, self.arm.joints))]
+        passed = [np.zeros((0, self.arm.joints))]
         for part in _parts(q):
             points, left = self.arm.points(part), np.arange(len(part))
             for name in names:
                 clear = (self._measures[name](points[..., left]) >= self.need).all(axis=0)
                 lost[name] += int(np.sum(~clear))
                 left = left[clear]
-            found.append(part[left])
-        return np.concatenate(found), lost
+            passed.append(part[left])
+        return np.concatenate(passed), lost
 
     def words(self, number: int) -> str:
         """Say what comes near what."""
@@ -395,15 +395,15 @@ class CollisionCheck:
                     rooms.append(Room(LINKS, words, *pieces))
         return rooms
 
-    def _without_connection(self, one: Capsule, other: Capsule, length: float) -> tuple[Piece, Piece] | None:
+    def _without_connection(self, capsule: Capsule, other: Capsule, length: float) -> tuple[Piece, Piece] | None:
         """Take away a length where two links are connected, half of each, all of the longer if one is too short."""
-        long, far = self._length(one), self._length(other)
+        long, far = self._length(capsule), self._length(other)
         taken = length / 2.0, length / 2.0
         if min(long, far) <= length / 2.0:
             taken = (length, 0.0) if long > far else (0.0, length)
         if taken[0] >= long or taken[1] >= far:
             return None
-        return Piece(one, 0.0, 1.0 - taken[0] / long), Piece(other, taken[1] / far)
+        return Piece(capsule, 0.0, 1.0 - taken[0] / long), Piece(other, taken[1] / far)
 
     def _length(self, capsule: Capsule) -> float:
         """Return how long a capsule is at most [m]."""

@@ -38,16 +38,16 @@ def safe_configuration(check: CollisionCheck, low: Array, high: Array) -> Array:
     joints = check.arm.robot.joints
     turning = np.array([joint.kind == "revolute" for joint in joints])
     holds_zero = (low <= -_INSIDE) & (high >= _INSIDE) & turning
-    rest = np.where(holds_zero, 0.0, (low + high) / 2.0)
+    middle = np.where(holds_zero, 0.0, (low + high) / 2.0)
     tried = [k for k in range(1, min(6, len(low))) if turning[k]]
     grid = np.array([*product(*(_FEWER if k == 5 else _ANGLES for k in tried))], ndmin=2)
     within = (grid >= (low + _INSIDE)[tried]) & (grid <= (high - _INSIDE)[tried])
-    at = np.tile(rest, (len(grid) + 1, 1))
-    at[1:, tried] = np.where(within, grid, rest[tried])
-    best, room = _best(check, at, rest)
+    at = np.tile(middle, (len(grid) + 1, 1))
+    at[1:, tried] = np.where(within, grid, middle[tried])
+    best, room = _best(check, at, middle)
     if room < check.need:
         drawn = np.random.default_rng(0).uniform(low, high, (_DRAWN, len(low)))
-        other, more = _best(check, drawn, rest)
+        other, more = _best(check, drawn, middle)
         if more > room:
             best, room = other, more
     if room < check.need:
@@ -62,11 +62,11 @@ def safe_configuration(check: CollisionCheck, low: Array, high: Array) -> Array:
     return best
 
 
-def _best(check: CollisionCheck, at: Array, rest: Array) -> tuple[Array, float]:
-    """Return the configuration with most room, the nearest to rest of those, and its room [m]."""
+def _best(check: CollisionCheck, at: Array, middle: Array) -> tuple[Array, float]:
+    """Return the configuration with most room, the nearest to the middle of those, and its room [m]."""
     room = check.room(at)
     enough = np.minimum(room, max(_ENOUGH * float(check.arm.along[check.arm.flange]), check.need))
-    away = np.abs(at - rest).sum(axis=1)
+    away = np.abs(at - middle).sum(axis=1)
     # To a millimetre, so that the nearest of many with the same room does not depend on the last digit.
     best = int(np.lexsort((np.arange(len(at)), away.round(6), -(enough / 1e-3).round()))[0])
     return np.asarray(at[best]), float(room[best])

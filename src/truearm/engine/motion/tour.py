@@ -112,20 +112,20 @@ def distance_words(distances: Mapping[str, float], floor: float | None, surface:
     """
     # Down to a tenth of a millimetre: never more than there is.
     near = [
-        (f"{math.floor(room * 1e4) / 10:g} mm", _thing(what, floor, surface, connected))
-        for what, room in distances.items()
+        (f"{math.floor(room * 1e4) / 10:g} mm", _thing(thing, floor, surface, connected))
+        for thing, room in distances.items()
     ]
     return ", ".join(f"{room}{'' if k else ' or more'} from {thing}" for k, (room, thing) in enumerate(near))
 
 
-def _thing(what: str, floor: float | None, surface: str, connected: float) -> str:
+def _thing(thing: str, floor: float | None, surface: str, connected: float) -> str:
     """Return what the arm comes near in words."""
-    if what == LINKS:
+    if thing == LINKS:
         stretch = math.ceil(connected * 100.0) * 10
         return f"its own links (but for up to {stretch} mm of the arm where two are connected)"
-    if what == FLOOR and floor is not None:
+    if thing == FLOOR and floor is not None:
         return f"the {surface} at {floor * 1e3:g} mm"
-    return f"the box '{what.removeprefix(KEPT_OUT)}'"
+    return f"the box '{thing.removeprefix(KEPT_OUT)}'"
 
 
 def ways_beside(table: Path) -> Path:
@@ -147,5 +147,5 @@ def tour_summary(tour: Tour, robot: Robot, joints_are: JointsOf) -> dict[str, An
         "floor_mm": None if tour.floor is None else 1e3 * tour.floor,
         "clearance_mm": 1e3 * tour.clearance,
         "room_mm": 1e3 * tour.room if math.isfinite(tour.room) else None,
-        "distances_mm": {what: 1e3 * room for what, room in tour.distances.items()},
+        "distances_mm": {thing: 1e3 * room for thing, room in tour.distances.items()},
     }

@@ -33,7 +33,7 @@ def nearest_on(check: CollisionCheck, joints: Array) -> dict[str, float]:
         distances: By the floor, each box and the links, the smallest first. Negative where they touch.
     """
     whats = list(dict.fromkeys(check.whats))
-    thing = np.array([whats.index(what) for what in check.whats], dtype=np.intp)
+    thing = np.array([whats.index(name) for name in check.whats], dtype=np.intp)
     starts, ends = (joints[:-1], joints[1:]) if len(joints) > 1 else (joints, joints)
     at = check.rooms(joints)
     at_start, at_end = (at[:, :-1], at[:, 1:]) if len(joints) > 1 else (at, at)
@@ -53,8 +53,8 @@ def nearest_on(check: CollisionCheck, joints: Array) -> dict[str, float]:
             np.concatenate([at_middle, at_end[:, left]], axis=1),
         )
         starts, ends = np.concatenate([starts, middle]), np.concatenate([middle, ends])
-    found = {what: float(least[k] - max(_TOLERANCE, _PART * least[k])) for k, what in enumerate(whats)}
-    return dict(sorted(found.items(), key=lambda item: item[1]))
+    nearest = {name: float(least[k] - max(_TOLERANCE, _PART * least[k])) for k, name in enumerate(whats)}
+    return dict(sorted(nearest.items(), key=lambda item: item[1]))
 
 
 def _lower(least: Array, thing: NDArray[np.intp], rooms: Array) -> None:
@@ -106,8 +106,8 @@ def limits_notices(robot: Robot, low: Array, high: Array) -> tuple[Notice, ...]:
             narrow.append(f"joint {k + 1} from {size * low[k]:.4g} to {size * high[k]:.4g} {unit}")
     if not narrow:
         return ()
-    told = "Hardly any range is left to a joint" if len(narrow) == 1 else "Hardly any range is left to joints"
-    return (LIMITS_TINY(f"{told}: {', '.join(narrow)}."),)
+    sentence = "Hardly any range is left to a joint" if len(narrow) == 1 else "Hardly any range is left to joints"
+    return (LIMITS_TINY(f"{sentence}: {', '.join(narrow)}."),)
 
 
 OTHER_BASE_ON_PENDANT: Final = Rule(
@@ -128,12 +128,12 @@ def _frame_notices(check: CollisionCheck) -> list[Notice]:
     named = " and ".join(
         ([f"The {cell.surface}"] if cell.floor is not None else []) + (["boxes"] if cell.boxes else [])
     )
-    kept = "are" if cell.boxes else "is"
+    verb = "are" if cell.boxes else "is"
     at = ", ".join(f"{round(1e3 * v, 3) + 0.0:g}" for v in moved)
     also = f", turned by {np.degrees(turned):.4g} deg" if turned >= _SAME else ""
     return [
         OTHER_BASE_ON_PENDANT(
-            f"{named[0].upper()}{named[1:]} {kept} kept in the base frame of the robot file. The pendant shows "
+            f"{named[0].upper()}{named[1:]} {verb} kept in the base frame of the robot file. The pendant shows "
             f"positions in another one, with its origin at ({at}) mm in it{also}: add that to what it shows."
         )
     ]

@@ -51,25 +51,25 @@ class WayFinder:
 
     def between(self, starts: Array, ends: Array) -> list[Way | None]:
         """Return a way for each pair of configurations, each ``(n, joints)``; None where none was found."""
-        found = self._straight(starts, ends)
-        for k in [k for k, way in enumerate(found) if way is None]:
-            found[k] = self._around(starts[k], ends[k])
-        left = [k for k, way in enumerate(found) if way is None]
+        ways = self._straight(starts, ends)
+        for k in [k for k, way in enumerate(ways) if way is None]:
+            ways[k] = self._around(starts[k], ends[k])
+        left = [k for k, way in enumerate(ways) if way is None]
         if left:
             out, back = (self.home_from(at) for at in (starts[left], ends[left]))
             for k, leave, come in zip(left, out, back, strict=True):
                 if leave is not None and come is not None:
                     over = np.concatenate([leave.over, self.home[None], come.over[::-1]])
-                    found[k] = Way(over, min(leave.room, come.room))
-        return found
+                    ways[k] = Way(over, min(leave.room, come.room))
+        return ways
 
     def home_from(self, at: Array) -> list[Way | None]:
         """Return a way from each configuration ``(n, joints)`` to the safe one; None where none was found."""
         home = np.broadcast_to(self.home, at.shape)
-        found = self._straight(at, home)
-        for k in [k for k, way in enumerate(found) if way is None]:
-            found[k] = self._around(at[k], self.home) or self._over_roomy(at[k])
-        return found
+        ways = self._straight(at, home)
+        for k in [k for k, way in enumerate(ways) if way is None]:
+            ways[k] = self._around(at[k], self.home) or self._over_roomy(at[k])
+        return ways
 
     def _straight(self, starts: Array, ends: Array) -> list[Way | None]:
         looked = self.check.ways(starts, ends)
@@ -89,12 +89,12 @@ class WayFinder:
         long = np.abs(over - start).max(axis=1, initial=0.0) + np.abs(end - over).max(axis=1, initial=0.0)
         over = over[np.argsort(long.round(9), kind="stable")]
         for few in (over[k : k + _TOGETHER] for k in range(0, len(over), _TOGETHER)):
-            there = self.check.ways(np.broadcast_to(start, few.shape), few)
-            left = np.flatnonzero(there.clear)
+            outward = self.check.ways(np.broadcast_to(start, few.shape), few)
+            left = np.flatnonzero(outward.clear)
             on = self.check.ways(few[left], np.broadcast_to(end, few[left].shape))
             if on.clear.any():
                 k = int(np.argmax(on.clear))
-                return Way(few[left[k]][None], float(min(there.room[left[k]], on.room[k])))
+                return Way(few[left[k]][None], float(min(outward.room[left[k]], on.room[k])))
         return None
 
     def _over_roomy(self, start: Array) -> Way | None:
@@ -103,10 +103,10 @@ class WayFinder:
         if not len(roomy):
             return None
         nearest = np.argsort(np.abs(roomy - start).max(axis=1), kind="stable")
-        there = self.check.ways(np.broadcast_to(start, roomy.shape), roomy[nearest])
-        for k in np.flatnonzero(there.clear):
+        outward = self.check.ways(np.broadcast_to(start, roomy.shape), roomy[nearest])
+        for k in np.flatnonzero(outward.clear):
             on = ways[nearest[k]]
-            return Way(np.concatenate([roomy[nearest[k]][None], on.over]), min(float(there.room[k]), on.room))
+            return Way(np.concatenate([roomy[nearest[k]][None], on.over]), min(float(outward.room[k]), on.room))
         return None
 
     def _with_room(self) -> tuple[Array, list[Way]]:
@@ -197,13 +197,13 @@ def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.G
         home = np.broadcast_to(finder.home, q.shape)
         ways = finder.check.ways(q, home).clear
         straight, clear = np.concatenate([straight, q[ways]]), np.concatenate([clear, q])
-    found = straight if 2 * len(straight) >= len(clear) else clear
-    made = Drawn(found[:count], drawn, count, lost)
+    configurations = straight if 2 * len(straight) >= len(clear) else clear
+    result = Drawn(configurations[:count], drawn, count, lost)
     if not len(clear):
         raise InputError(
             "there is no configuration in which the arm keeps clear",
             parameter="clearance",
-            came=f"{drawn} drawn; rejected by {made.words}",
+            came=f"{drawn} drawn; rejected by {result.words}",
             cure="Lower `clearance`, or see that the limits, the floor and boxes to keep out of leave the arm room.",
         )
-    return made
+    return result

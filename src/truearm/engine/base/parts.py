@@ -293,7 +293,7 @@ _PATIENCE: Final = 1.0
 
 
 @dataclass(frozen=True)
-class Done(Generic[Part, Result]):
+class DonePart(Generic[Part, Result]):
     """A part with its result; lost, and without one, if the workers that did it died again and again."""
 
     part: Part
@@ -306,7 +306,7 @@ def done_parts(
     parts: Iterable[Part],
     workers: Workers,
     tell: Callable[[str], None] = lambda _: None,
-) -> Iterator[Done[Part, Result]]:
+) -> Iterator[DonePart[Part, Result]]:
     """Do parts of work, and return each as soon as it is done.
 
     Where a worker dies, new ones are started. Nobody knows of which of the parts that were being done it died, so they
@@ -343,7 +343,7 @@ class _Run(Generic[Part, Result]):
         self._suspects: deque[tuple[Part, int]] = deque()
         self._in_a_row = 0
 
-    def results(self) -> Iterator[Done[Part, Result]]:
+    def results(self) -> Iterator[DonePart[Part, Result]]:
         """Go on until every part is done or given up."""
         while self._hand_out():
             finished, _ = wait(self.running, _PATIENCE, FIRST_COMPLETED)
@@ -352,9 +352,9 @@ class _Run(Generic[Part, Result]):
             broken: BaseException | None = None
             for future in finished:
                 try:
-                    outcome = Done(self.running[future][0], future.result())
+                    outcome = DonePart(self.running[future][0], future.result())
                 except self._workers.lost:
-                    outcome = Done[Part, Result](self.running[future][0], None, lost=True)
+                    outcome = DonePart[Part, Result](self.running[future][0], None, lost=True)
                 except (BrokenExecutor, CancelledError) as error:
                     broken = error
                     continue
@@ -392,7 +392,7 @@ class _Run(Generic[Part, Result]):
         else:
             self.running[future] = part, deaths
 
-    def _broken(self, reason: BaseException) -> Iterator[Done[Part, Result]]:
+    def _broken(self, reason: BaseException) -> Iterator[DonePart[Part, Result]]:
         """Repeat what was being done, or give up the part of which a worker died alone too often."""
         running = [(part, deaths + 1) for part, deaths in self.running.values()]
         self.running.clear()
@@ -407,7 +407,7 @@ class _Run(Generic[Part, Result]):
         except InputError as error:
             raise error from reason
         if deaths == _MOST_DEATHS:
-            yield Done(part, None, lost=True)
+            yield DonePart(part, None, lost=True)
 
     def _renew(self) -> None:
         self._in_a_row += 1

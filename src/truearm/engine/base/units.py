@@ -208,14 +208,14 @@ def parts_of(things: Iterable[object]) -> tuple[Marked, ...]:
     return tuple(part for part in ("data", "robot") if part in parts)
 
 
-def said_of(parts: Sequence[Marked]) -> list[str]:
+def mark_lines(parts: Sequence[Marked]) -> list[str]:
     """Return the line that says what is simulated; none of what is not."""
     return [f"{WORD} {_WORDS[tuple(parts)]}"] if parts else []
 
 
 def with_mark(lines: Iterable[str], parts: Sequence[Marked]) -> list[str]:
     """Return lines with the mark first, and only there."""
-    return [*said_of(parts), *without_mark(lines)] if parts else [*lines]
+    return [*mark_lines(parts), *without_mark(lines)] if parts else [*lines]
 
 
 def without_mark(lines: Iterable[str]) -> list[str]:

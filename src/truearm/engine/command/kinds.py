@@ -485,7 +485,7 @@ class NamedFiles(Given):
         return [f"{name}={file}" for name, file in value.items()]
 
 
-class Told(Given):
+class Callback(Given):
     """A function that is called with a few words at each step; it is no part of what is asked for."""
 
     def check(self, value: Any, name: str) -> Any:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.engine.base.arrays import axes, finite_number, number_array
 from truearm.engine.base.errors import InputError, as_html, counted, listed, short_text
-from truearm.engine.base.units import Marked, said_of
+from truearm.engine.base.units import Marked, mark_lines
 from truearm.engine.data.dataset_fields import (
     checked_joints,
     checked_kinds,
@@ -121,7 +121,7 @@ class Dataset:
         }
         return short_text(
             [
-                *said_of(self.simulated_from),
+                *mark_lines(self.simulated_from),
                 f"{self.source}: {counted(self.configurations, 'configuration')} "
                 f"of {counted(len(self.joint_kinds), 'joint')}"
                 f"{' as the controller shows them' if self.joints_are == 'controller' else ''}",

@@ -40,7 +40,7 @@ def check_duplicates(data: Dataset) -> list[Notice]:
         return []
     return [
         DUPLICATES(
-            f"{counted(len(pairs), 'reading')} repeat{'s' if len(copies) == 1 else ''} another one to the last digit "
+            f"{counted(len(pairs), 'reading')} repeat{'s' if len(pairs) == 1 else ''} another one to the last digit "
             f"(target at configurations): {listed(pairs)}. Rows were copied, or the instrument stood still: remove "
             f"{'it, it counts' if len(pairs) == 1 else 'them, they count'} twice.",
             at=tuple(dict.fromkeys(at)),

@@ -23,7 +23,7 @@ from truearm.engine.base.errors import (
     shortened,
     with_short_words,
 )
-from truearm.engine.base.units import parts_of, said_of
+from truearm.engine.base.units import mark_lines, parts_of
 from truearm.engine.base.version import __version__
 from truearm.engine.document.drawing import AFTER, BEFORE, DARK, Figure
 
@@ -44,7 +44,7 @@ def page(template: Path, figures: Mapping[str, Figure], of: object, **content: A
     """
     return _template(template).render(
         **content,
-        mark=said_of(parts_of([of])),
+        mark=mark_lines(parts_of([of])),
         drawn=set(figures),
         heights={name: figure["layout"]["height"] for name, figure in figures.items()},
         figures=Markup(json_for_script(figures)),

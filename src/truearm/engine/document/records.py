@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from truearm.engine.base.errors import Notice, as_html, counted, has_error, listed, short_text, worst_first
-from truearm.engine.base.units import Marked, parts_of, said_of, with_mark
+from truearm.engine.base.units import Marked, mark_lines, parts_of, with_mark
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.document.document import Block, detail, held_by, leaves_of, lines_of, say
+from truearm.engine.document.document import Block, detail, json_of, leaves_of, lines_of, say
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 
@@ -75,7 +75,7 @@ class Record:
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them, units in the names."""
-        summary = held_by(self.everything())
+        summary = json_of(self.everything())
         return {name: summary[name] for name in ("truearm",) if name in summary} | summary
 
     def as_json(self) -> Any:
@@ -114,7 +114,7 @@ def first_screen(record: Record) -> list[str]:
     if record.is_list or len(everything) < _LINES:
         return everything
     notices, steps = worst_first(getattr(record, "warnings", ())), getattr(record, "next", ())
-    mark, leaves = said_of(record.simulated_from), [*leaves_of(record.blocks())]
+    mark, leaves = mark_lines(record.simulated_from), [*leaves_of(record.blocks())]
     free = _LINES - len(mark) - len(steps[:1]) - 2  # the last two count the rest, and say where files are
     grave, answer = sum(n.level == "error" for n in notices), sum(len(x.lines) for x in leaves if not x.is_detail)
     shown = min(len(notices), _FIRST, max(1, grave, free - answer))

@@ -25,7 +25,7 @@ class Question:
     parameter: str  #: Of the job, which answers it.
     text: str  #: The question, and why it is asked.
     answers: str  #: How the parameter answers it.
-    kept: str  #: Where an answer can be kept, in a sentence.
+    stored: str  #: Where an answer can be kept, in a sentence.
 
 
 def refuse_unanswered(questions: Iterable[Question | None]) -> None:
@@ -37,7 +37,7 @@ def refuse_unanswered(questions: Iterable[Question | None]) -> None:
     asked = [question for question in questions if question is not None]
     if not asked:
         return
-    texts = [f"{question.text} Answer with {question.answers}. {question.kept}" for question in asked]
+    texts = [f"{question.text} Answer with {question.answers}. {question.stored}" for question in asked]
     raise InputError(
         "nothing is corrected before this is answered",
         parameter=", ".join(question.parameter for question in asked),

@@ -98,7 +98,7 @@ def spelled(text: str) -> str:
     return with_parameters(text, spell)
 
 
-def _given(context: typer.Context, name: str) -> bool:
+def _is_typed(context: typer.Context, name: str) -> bool:
     source = context.get_parameter_source(name)
     return source is not None and source.name != "DEFAULT"
 
@@ -237,7 +237,7 @@ def _only_those(values: Mapping[str, Any], instead: type[Request], declared: Map
     """Return what was given of the options that another request takes, or refuse what it does not take."""
     own, context = dict(instead.options()), _running.get()
     for name in values:
-        if name not in own and not declared[name].is_argument and context is not None and _given(context, name):
+        if name not in own and not declared[name].is_argument and context is not None and _is_typed(context, name):
             raise InputError("only one of them can hold", parameter=f"{instead.job}, {name}", cure="Leave one out.")
     return {name: value for name, value in values.items() if name in own}
 
@@ -266,7 +266,7 @@ def _values_of(request: type[Request], others: Mapping[str, type[Request]], type
         name: value
         for name, value in typed.items()
         if value is not None
-        and (context is None or name not in context.params or _given(context, name))
+        and (context is None or name not in context.params or _is_typed(context, name))
         and (name != "device" or name in own)
     }
     for name, value in values.items():
@@ -296,24 +296,22 @@ def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, O
     typed = kind.typed
     if declared.is_argument:
         shown: Any = declared.shown if isinstance(declared.shown, str) else False
-        typer_option: Any = typer.Argument(metavar=metavar, help=text, show_default=shown)
+        info: Any = typer.Argument(metavar=metavar, help=text, show_default=shown)
     else:
         is_shown = isinstance(declared.shown, str) or (declared.shown and default not in (None, ()))
         shown = declared.shown if is_shown and not declared.needed else False
         shown = spelled_by(shown, others) if isinstance(shown, str) else shown
         only: dict[str, Any] = {} if typed is bool else {"metavar": metavar, "show_default": shown}
-        typer_option = typer.Option(flag, help=text, rich_help_panel=declared.panel, **only)
-    typer_default: Any
+        info = typer.Option(flag, help=text, rich_help_panel=declared.panel, **only)
+    preset: Any
     if declared.needed:
-        typer_default = inspect.Parameter.empty
+        preset = inspect.Parameter.empty
     elif default in (None, ()):
-        typed, typer_default = typed | None, None
+        typed, preset = typed | None, None
     else:
-        (typer_default,) = (default,) if typed is bool else kind.typed_again(default)
-        typer_default = typed(typer_default) if typed in (int, float) else typer_default
-    return inspect.Parameter(
-        name, inspect.Parameter.KEYWORD_ONLY, default=typer_default, annotation=Annotated[typed, typer_option]
-    )
+        (preset,) = (default,) if typed is bool else kind.typed_again(default)
+        preset = typed(preset) if typed in (int, float) else preset
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=preset, annotation=Annotated[typed, info])
 
 
 def spelled_by(text: str, declared: Mapping[str, Option]) -> str:

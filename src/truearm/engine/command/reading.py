@@ -94,9 +94,7 @@ def in_parts(excluded: tuple[Excluded, ...], split: Dataset, held_out: IntArray)
     def part(label: str) -> Part:
         return "held out" if label in judging else "training" if label in known else "left out"
 
-    return tuple(
-        Excluded(exclusion.row, exclusion.readings, part(exclusion.row.configuration)) for exclusion in excluded
-    )
+    return tuple(Excluded(entry.row, entry.readings, part(entry.row.configuration)) for entry in excluded)
 
 
 def count_excluded(excluded: tuple[Excluded, ...]) -> dict[str, int]:

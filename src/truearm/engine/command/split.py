@@ -344,7 +344,7 @@ def known_of(robot: Robot) -> list[Notice]:
                 "targets cannot be predicted."
             )
         ]
-    return calibration_notices(robot)
+    return faults_of(robot)
 
 
 CHANGED_SINCE_WRITTEN: Final = Rule(
@@ -370,7 +370,7 @@ def changed_since(robot: object) -> list[Notice]:
     ]
 
 
-def calibration_notices(robot: Robot) -> list[Notice]:
+def faults_of(robot: Robot) -> list[Notice]:
     """Return what speaks against the calibration of a robot that is used all the same."""
     return [
         *(Notice(name, message) for name, message in _against(robot).items()),

@@ -66,13 +66,13 @@ class _About(BaseModel):
     normal: Triple
 
 
-class _Kept(BaseModel):
+class _TipOrientation(BaseModel):
     model_config = STRICT
     axis: Triple | None = None
     quaternion: Quaternion | None = None
 
     @model_validator(mode="after")
-    def _one_of_them(self) -> _Kept:
+    def _one_of_them(self) -> _TipOrientation:
         if (self.axis is None) == (self.quaternion is None):
             raise InputError("one orientation belongs here", allowed="axis: [x, y, z], or quaternion: [w, x, y, z]")
         return self
@@ -127,7 +127,7 @@ class PathFile(BaseModel):
     frame: PathFrame = "nominal"
     tip: Triple | None = None
     target: str | None = None
-    orientation: _Kept | None = None
+    orientation: _TipOrientation | None = None
     speed: Positive
     acceleration: Positive
     step: Positive
@@ -197,7 +197,7 @@ def planned_path(content: PathFile, source: str) -> PlannedPath:
         where = f"{source}, sections[{number}]"
         with refusals_at(where):
             if section.times is not None:
-                part = _as_given(section, at, step, length, where)
+                part = _prescribed(section, at, step, length, where)
                 kind = "hermite"
             else:
                 kind, way = _way(section, at, length, where)
@@ -252,7 +252,7 @@ def _way(section: _Section, start: Array, length: str, where: str) -> tuple[str,
     return "hermite", Hermite(_waypoints(start, [place(point) for point in section.hermite], length))
 
 
-def _as_given(section: _Section, start: Array, step: float, length: str, where: str) -> Trajectory:
+def _prescribed(section: _Section, start: Array, step: float, length: str, where: str) -> Trajectory:
     """Return a section whose waypoints have times and velocities."""
     assert section.hermite is not None
     assert section.velocities is not None
@@ -296,7 +296,7 @@ def _refuse_too_many(duration: float, step: float) -> None:
     refuse_beyond("samples", int(min(duration / step, 1e9)))
 
 
-def _orientation(entry: _Kept | None) -> tuple[Orientation, Array]:
+def _orientation(entry: _TipOrientation | None) -> tuple[Orientation, Array]:
     if entry is None:
         return "free", np.eye(3)
     if entry.quaternion is not None:

@@ -75,8 +75,7 @@ class WayFinder:
         looked = self.check.ways(starts, ends)
         none = np.zeros((0, starts.shape[1]))
         return [
-            Way(none, float(distance)) if clear else None
-            for clear, distance in zip(looked.clear, looked.distance, strict=True)
+            Way(none, float(gap)) if clear else None for clear, gap in zip(looked.clear, looked.distance, strict=True)
         ]
 
     def _around(self, start: Array, end: Array) -> Way | None:

@@ -118,11 +118,9 @@ class _Place(_Entry):
 
     @model_validator(mode="after")
     def _one_orientation(self) -> _Place:
-        orientations = [name for name in _ORIENTATIONS if getattr(self, name) is not None]
-        if len(orientations) > 1:
-            raise InputError(
-                "one orientation belongs here", came=" and ".join(orientations), allowed=", ".join(_ORIENTATIONS)
-            )
+        forms = [name for name in _ORIENTATIONS if getattr(self, name) is not None]
+        if len(forms) > 1:
+            raise InputError("one orientation belongs here", came=" and ".join(forms), allowed=", ".join(_ORIENTATIONS))
         return self
 
 

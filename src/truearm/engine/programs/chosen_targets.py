@@ -226,7 +226,7 @@ def _key(tool: str) -> str:
 
 
 #: Programs write a gram where a mass has to be and is not known [kg].
-_NOT_GIVEN: Final = 0.01
+_LEAST_MASS: Final = 0.01
 
 
 def loads_of_tools(robot: Robot, programs: Sequence[Program]) -> dict[str, Payload | None]:
@@ -237,7 +237,7 @@ def loads_of_tools(robot: Robot, programs: Sequence[Program]) -> dict[str, Paylo
     """
     loads: dict[str, Payload | None] = {}
     for tool, load in _stated_loads(programs):
-        in_flange = None if load is None or load.mass < _NOT_GIVEN else _in_flange(robot, load)
+        in_flange = None if load is None or load.mass < _LEAST_MASS else _in_flange(robot, load)
         loads[tool] = in_flange if loads.get(tool, in_flange) == in_flange else None
     return loads
 

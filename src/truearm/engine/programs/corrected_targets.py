@@ -37,9 +37,9 @@ _SCHEMA: Final = "truearm-corrections/1"
 #: Bytes of a digest: among a million targets, two that differ have the same one once in 300 million cases.
 _SIZE: Final = 6
 #: So many digests are kept of a program, the smallest: a sample that any other program can be compared with.
-_KEPT: Final = 1000
+_MOST: Final = 1000
 #: A program is corrected already if one of so many of its targets is: single points of a dense path may coincide.
-_ONE_OF: Final = 20
+_ONE_IN: Final = 20
 #: Beyond this part of a step, a number that was written with other decimals may be rounded to the next one.
 _NEAR: Final = 0.45
 
@@ -91,7 +91,7 @@ def corrected_digests(original: Iterable[ProgramTarget], corrected: Iterable[Pro
     """Return the digests of the targets of a corrected program that its original does not have."""
     old = {digest for target in original if target.parent is None for digest in _digests(target)}
     new = {_digests(target)[0] for target in corrected if target.parent is None} - old
-    return base64.b64encode(b"".join(sorted(new)[:_KEPT])).decode()
+    return base64.b64encode(b"".join(sorted(new)[:_MOST])).decode()
 
 
 def refuse_corrected(corrections: Sequence[Correction], known: Sequence[KnownCorrection]) -> None:
@@ -113,8 +113,8 @@ def refuse_corrected(corrections: Sequence[Correction], known: Sequence[KnownCor
                     lines |= dict.fromkeys(digests, target.line)
             for other, digests_of_other in entries:
                 matched_lines = {lines[digest] for digest in digests_of_other if digest in lines}
-                last = digests_of_other[-1] if len(digests_of_other) == _KEPT else b"\xff" * _SIZE
-                if matched_lines and _ONE_OF * len(matched_lines) >= sum(digest <= last for digest in own):
+                last = digests_of_other[-1] if len(digests_of_other) == _MOST else b"\xff" * _SIZE
+                if matched_lines and _ONE_IN * len(matched_lines) >= sum(digest <= last for digest in own):
                     raise InputError(
                         "this program was corrected already",
                         where=source.where(min(matched_lines)),
@@ -187,9 +187,7 @@ def remember(ledger: Path, programs: Sequence[LedgerEntry]) -> None:
         new = [program for program in programs if program.targets and program.targets not in known_targets]
         if not new:
             return
-        text = json.dumps(
-            {"truearm": _SCHEMA, "programs": [entry.model_dump() for entry in (*entries, *new)]}, indent=1
-        )
+        text = json.dumps({"truearm": _SCHEMA, "programs": [p.model_dump() for p in (*entries, *new)]}, indent=1)
         try:
             write_text_over(ledger, text + "\n", None if content is None else hash_of(content))
         except InputError:

@@ -60,16 +60,16 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
     Returns:
         base, flange: ``T_base_nominalbase`` and ``T_flange_nominalflange``, ``(4, 4)`` each [m].
     """
-    base, flange, _ = _agreement(robot, nominal_robot(robot), not base_is_fixed(robot), _flange_freedom(robot))
+    base, flange, _ = _agreement(robot, nominal_robot(robot), not base_fixed(robot), _flange_freedom(robot))
     return base, flange
 
 
-def base_is_fixed(robot: Robot) -> bool:
+def base_fixed(robot: Robot) -> bool:
     """Return whether the calibration of a robot held its base."""
     return robot.proof is not None and BASE in robot.proof.held
 
 
-def flange_is_fixed(robot: Robot) -> bool:
+def flange_fixed(robot: Robot) -> bool:
     """Return whether targets that the calibration of a robot held say where its flange is."""
     return robot.proof is not None and not _flange_freedom(robot).shape[1]
 
@@ -149,7 +149,7 @@ def flange_rates(robot: Robot, names: Sequence[str]) -> Array:
     moved = np.concatenate(robot.jacobians(robot.forward_kinematics(joints), joints, names), axis=1)
     moved[[robot.parameters[name].group == "base" for name in names]] = 0.0
     weight = np.repeat([1.0, reach(nominal_robot(robot), None)], 3)
-    freedom, base_moves = _flange_freedom(robot), not base_is_fixed(robot)
+    freedom, base_moves = _flange_freedom(robot), not base_fixed(robot)
     if not freedom.shape[1]:
         return np.zeros((6, len(names)))
     rows = np.concatenate([_by_base(poses)[:, :, : 6 * base_moves], _by_flange(poses) @ freedom], axis=2)

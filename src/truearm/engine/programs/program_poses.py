@@ -130,15 +130,11 @@ def edits_of(program: Program, numbers: dict[int, Array]) -> list[Edit]:
         for number, (span, value, decimals) in enumerate(zip(target.places, new.tolist(), fewest, strict=True)):
             if span is not None:
                 old = text[span[0] : span[1]] or "0"
-                digits = rewritten(old, value, decimals)
-                if digits != old:
+                word = rewritten(old, value, decimals)
+                if word != old:
                     absent = span[0] == span[1]
                     edits.append(
-                        Edit(
-                            target.source,
-                            *span,
-                            target.form.absent[number].format(digits) if absent else digits,
-                        )
+                        Edit(target.source, *span, target.form.absent[number].format(word) if absent else word)
                     )
     return edits
 

@@ -23,11 +23,11 @@ from truearm.engine.data.readers.rows import (
     Readings,
     before_each,
     check_mark,
-    configurations_of_rows,
     dataset_of,
     order_of,
     order_of_labels,
     roles_of,
+    row_configurations,
     same_everywhere,
     scale_sigma_of,
     visits_of,
@@ -243,9 +243,7 @@ def read_csv(path: Path) -> Dataset:
     joints_are, names = joint_names(columns, f"{path}, line {header}")
     joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"].place)
-    configurations = configurations_of_rows(
-        cells, labels, [j.place for j in joints], [j.unit for j in joints], joints_are
-    )
+    configurations = row_configurations(cells, labels, [j.place for j in joints], [j.unit for j in joints], joints_are)
 
     def numbers(*names: str, deviation: bool = False) -> Array:
         wanted = [columns[name] for name in names]

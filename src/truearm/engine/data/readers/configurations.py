@@ -19,8 +19,8 @@ from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cell
 from truearm.engine.data.readers.rows import (
     Configurations,
     Readings,
-    configurations_of_rows,
     dataset_of,
+    row_configurations,
     unit_quaternions,
 )
 from truearm.engine.robot.chain import Array
@@ -29,7 +29,7 @@ from truearm.engine.robot.urdf_writing import JOINT_COLUMN, joint_names
 STOP_COLUMN: Final = re.compile(r"(?P<name>approach_[1-9][0-9]{0,3})\s*(?:\[(?P<unit>[^\]]*)\])?")
 
 
-def stops_in(cells: Cells, configurations: Configurations) -> Configurations | None:
+def stops_in(cells: Cells, measured: Configurations) -> Configurations | None:
     """Return the joint positions of these stops, counted as those of the configurations; None where there are none.
 
     Raises:
@@ -46,7 +46,7 @@ def stops_in(cells: Cells, configurations: Configurations) -> Configurations | N
             columns[match["name"]] = place, checked_unit(match["unit"], (*ANGLE_UNITS, *LENGTH_UNITS), at)
     if not columns:
         return None
-    names = [f"approach_{number}" for number in range(1, configurations.joints.shape[1] + 1)]
+    names = [f"approach_{number}" for number in range(1, measured.joints.shape[1] + 1)]
     if {*columns} != {*names}:
         raise InputError(
             "the stops before the configurations are not those of the joints",
@@ -56,8 +56,8 @@ def stops_in(cells: Cells, configurations: Configurations) -> Configurations | N
             cure="Give one to each joint, or leave all of them out.",
         )
     places, units = zip(*(columns[name] for name in names), strict=True)
-    return configurations_of_rows(
-        cells, [configurations.labels[at] for at in configurations.of_row], places, units, configurations.joints_are
+    return row_configurations(
+        cells, [measured.labels[at] for at in measured.of_row], places, units, measured.joints_are
     )
 
 
@@ -151,7 +151,7 @@ def _configurations(table: _Table) -> Configurations:
     joints_are, names = joint_names(table.columns, table.where)
     places, units = zip(*(table.columns[name] for name in names), strict=True)
     labels = table.cells.texts(table.columns[_LABEL][0])
-    return configurations_of_rows(table.cells, labels, places, units, joints_are)
+    return row_configurations(table.cells, labels, places, units, joints_are)
 
 
 def _unseen(cells: Cells, configurations: Configurations) -> Dataset:

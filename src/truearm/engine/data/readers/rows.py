@@ -40,7 +40,7 @@ class Configurations:
     simulated: bool = False  #: Whether a virtual instrument read any of their rows.
 
 
-def configurations_of_rows(
+def row_configurations(
     cells: Cells, labels: Sequence[str], columns: Sequence[int], units: Sequence[str], joints_are: JointsOf = "model"
 ) -> Configurations:
     """Gather the configurations of a table in which every row has a label and all joints.

@@ -21,7 +21,7 @@ from truearm.engine.base.units import COLUMN as SIMULATED
 from truearm.engine.data.readers.canonical import refuse_other_separators
 from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cells, sheet_place
 from truearm.engine.data.readers.configurations import stops_in
-from truearm.engine.data.readers.rows import Configurations, configurations_of_rows
+from truearm.engine.data.readers.rows import Configurations, row_configurations
 from truearm.engine.robot.urdf_writing import JOINT_COLUMN, joint_names
 
 #: Endings of workbooks that are read.
@@ -310,7 +310,7 @@ def columns_beside_joints(
         units: The units of those that need one.
         optional: Those that may be left out.
     """
-    columns = _matched_columns(cells, shown, units, _JOINTS)
+    columns = _columns_of(cells, shown, units, _JOINTS)
     joint_names(columns, f"{cells.source}, line {cells.header}")
     return _complete(cells, columns, shown, optional, _JOINTS)
 
@@ -323,12 +323,10 @@ def named_columns(
     Args:
         shown, units, optional: As for :func:`columns_beside_joints`.
     """
-    return _complete(cells, _matched_columns(cells, shown, units), shown, optional)
+    return _complete(cells, _columns_of(cells, shown, units), shown, optional)
 
 
-def _matched_columns(
-    cells: Cells, shown: Mapping[str, str], units: Mapping[str, tuple[str, ...]], *more: str
-) -> Columns:
+def _columns_of(cells: Cells, shown: Mapping[str, str], units: Mapping[str, tuple[str, ...]], *more: str) -> Columns:
     columns: Columns = {}
     header = f"{cells.source}, line {cells.header}"
     allowed = ", ".join([*shown.values(), *more])
@@ -378,9 +376,7 @@ def configurations_of(cells: Cells, columns: Columns) -> Configurations:
     joints_are, names = joint_names(columns, f"{cells.source}, line {cells.header}")
     joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"][0])
-    return configurations_of_rows(
-        cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are
-    )
+    return row_configurations(cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are)
 
 
 def joints_in_file(path: Path) -> tuple[Cells, Configurations]:

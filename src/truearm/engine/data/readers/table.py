@@ -29,7 +29,7 @@ from truearm.engine.data.readers.row_values import (
     uneven_deviations,
     unlikely_radians,
 )
-from truearm.engine.data.readers.rows import Configurations, Readings, configurations_of_rows, dataset_of, visits_of
+from truearm.engine.data.readers.rows import Configurations, Readings, dataset_of, row_configurations, visits_of
 from truearm.engine.data.readers.sheets import is_workbook, joints_in_file, read_sheet
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
@@ -386,7 +386,7 @@ def _configurations(
                 allowed=counted(len(row_labels), "row"),
                 cure="Without a key, row n is the nth configuration: name the column of labels.",
             )
-    configurations = configurations_of_rows(table, row_labels, places, entry.unit_of_each, joints_are)
+    configurations = row_configurations(table, row_labels, places, entry.unit_of_each, joints_are)
     return configurations, _of_rows(cells, labels, configurations, table, entry.key)
 
 

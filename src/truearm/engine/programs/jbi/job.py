@@ -24,7 +24,7 @@ LINE: Final = re.compile(r"[^\r\n]+")
 _N: Final = rf"[ \t]*((?>{NUMBER}))[ \t]*"
 _SIX: Final = re.compile(rf"[ \t]*([CP])(\d{{1,6}})[ \t]*={_N},{_N},{_N},{_N},{_N},{_N}")
 _NAME: Final = re.compile(r"[ \t]*(BC|BP|EC|EX|C|P)(\d{1,6})[ \t]*=")
-_ONE: Final = re.compile(_N)
+_NUMBER: Final = re.compile(_N)
 _STATE: Final = re.compile(r"[ \t]*///(NPOS|TOOL|USER|POSTYPE|RCONF)(?:[ \t]+|$)")
 _COUNT: Final = re.compile(r"\d{1,6}")
 _POSTYPES: Final = ("PULSE", "ANGLE", "BASE", "ROBOT", "USER", "TOOL", "MTOOL")
@@ -167,7 +167,7 @@ def _numbers(source: Source, line: int, start: int, stop: int) -> tuple[tuple[fl
     values: list[float] = []
     places: list[tuple[int, int]] = []
     while True:
-        match = _ONE.match(source.text, start, stop)
+        match = _NUMBER.match(source.text, start, stop)
         if match is None:
             source.refuse(line, "a number is missing or malformed", came=source.text[start:stop])
         values.append(float(match[1]))

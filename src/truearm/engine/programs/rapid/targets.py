@@ -199,22 +199,18 @@ class Expressions:
 
     def _array(self, datum: Datum, pattern: re.Pattern[str]) -> list[Candidate]:
         code = self.listing.codes[datum.source]
-        elements: list[Candidate] = []
+        items: list[Candidate] = []
         sizes = _sizes(datum.size or "")
         end = datum.start
         for match in pattern.finditer(code, datum.start, datum.stop):
             if code[end : match.start()].strip(" \t\r\n[],"):
                 break
             end = match.end()
-            index = _index_name(len(elements), sizes)
-            elements.append(self._written_out(datum.source, match, datum, f"{datum.name}{{{index}}}"))
-        if (
-            elements
-            and (sizes is None or len(elements) == prod(sizes))
-            and not code[end : datum.stop].strip(" \t\r\n]")
-        ):
-            return elements
-        del self.candidates[len(self.candidates) - len(elements) :]
+            index = _index_name(len(items), sizes)
+            items.append(self._written_out(datum.source, match, datum, f"{datum.name}{{{index}}}"))
+        if items and (sizes is None or len(items) == prod(sizes)) and not code[end : datum.stop].strip(" \t\r\n]"):
+            return items
+        del self.candidates[len(self.candidates) - len(items) :]
         return [self._written_out(datum.source, None, datum, datum.name)]
 
     def _written_out(

@@ -170,9 +170,7 @@ class Use(NamedTuple):
     spot: Spot
     words: tuple[int, int]  #: In whose place other numbers could stand; ``(0, 0)`` if none could.
     near: tuple[float, ...] | None = None  #: The joints that it is named to be near to.
-    at_spot: bool = (
-        True  #: Whether the move ends at the spot, and not at an offset beyond it that only the robot knows.
-    )
+    at_spot: bool = True  #: Whether the move ends there, and not at an offset beyond it that only the robot knows.
 
 
 class At(NamedTuple):

@@ -70,7 +70,7 @@ def texts(name: str, program: NewProgram) -> dict[Path, str]:
 def read_again(name: str, program: NewProgram) -> Program:
     sources = [Source(file, text) for file, text in texts(name, program).items()]
     assert all(source.text.isascii() for source in sources)
-    assert all(BY_NAME[name].is_one(source.text) for source in sources)
+    assert all(BY_NAME[name].recognizes(source.text) for source in sources)
     return BY_NAME[name].read(sources)
 
 

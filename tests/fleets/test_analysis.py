@@ -15,7 +15,7 @@ import pytest
 from tests.expecting import known
 from tests.fleets.simulated_series import Calibrations, calibrations, campaign, kind_of, rows
 
-from truearm.engine.document.document import held_by, lines_of
+from truearm.engine.document.document import json_of, lines_of
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot_file.reading import read_robot
@@ -471,7 +471,7 @@ def test_notices_say_what_figures_do_not() -> None:
 
 
 def test_json_holds_figures_in_mm_and_deg() -> None:
-    said = held_by(analysis_blocks(analysed(series(12))))
+    said = json_of(analysis_blocks(analysed(series(12))))
     (kind,) = said["kinds"]
     told = {row["name"]: row for row in kind["parameters"]}
     assert told["a_3"]["unit"] == "mm"
@@ -516,7 +516,7 @@ def test_results_that_end_with_an_error_are_in_no_figure() -> None:
     assert (first.robot, [reason.why for reason in first.reasons]) == ("robot-5", ["error"])
     said = "Left out of all figures, because their results end with an error: 1 robot (robot-5)."
     assert said in analysis_lines(found)
-    assert held_by(analysis_blocks(found))["left_out"] == ["robot-5"]
+    assert json_of(analysis_blocks(found))["left_out"] == ["robot-5"]
 
 
 # -- pictures: of few robots every value, of many no more than a picture needs -------------------------------------

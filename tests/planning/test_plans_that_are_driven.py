@@ -88,7 +88,7 @@ def test_thirty_poses_are_driven(name: str) -> None:
     assert robot.forward(planned.joints)[0][:, 2].min() > 0.05
     room = sampled_room(robot, on_the_ways(planned), Cell(), points=7)
     assert room.min() >= 0.05
-    assert 0.05 <= tour.room <= sampled_room(robot, tour.joints, Cell()).min() + 1e-5
+    assert 0.05 <= tour.distance <= sampled_room(robot, tour.joints, Cell()).min() + 1e-5
 
 
 @pytest.mark.parametrize("name", ["irb120", "ur5e", "fr3"])
@@ -404,7 +404,7 @@ def walled() -> Reachable:
     check = CollisionCheck(robot, Cell(-1.0, boxes_of(walls), 0.02))
     low, high = np.array([joint.range for joint in robot.joints]).T
     drawn = np.random.default_rng(1).uniform(low, high, (400, 6))
-    clear = drawn[check.room(drawn) >= check.need]
+    clear = drawn[check.smallest_distance(drawn) >= check.need]
     return Reachable(WayFinder(check, HOME, low, high), clear, clear)
 
 

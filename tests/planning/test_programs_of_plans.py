@@ -14,7 +14,7 @@ from tests.simulated import campaign
 import truearm
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.manifest import MANIFEST, hash_of
-from truearm.engine.document.document import held_by
+from truearm.engine.document.document import json_of
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.devices import named_device
@@ -176,7 +176,7 @@ def test_a_speed_below_the_lowest_share_of_a_language_is_told(planned: Plan) -> 
         assert bool(slow.speeds) == (robot is known)
         assert ("as fast as any" in slow.warnings[0].message) == (program == "krl" and robot is unknown)
         assert (slow.fastest > 0.011) == (program == "krl")
-        assert held_by(slow.blocks())["speed_mm_s"] == 1e3 * slow.fastest
+        assert json_of(slow.blocks())["speed_mm_s"] == 1e3 * slow.fastest
     assert "KRL says no share below 1 %" not in "\n".join(planned.lines())
 
 

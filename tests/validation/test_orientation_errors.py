@@ -78,7 +78,7 @@ def test_a_turn_about_an_axis_of_the_base_shows_there() -> None:
     assert found.zxz[np.isfinite(found.zxz[:, 0])] == pytest.approx(
         np.tile([0.01, 0.0, 0.0], (20 - found.locked, 1)), abs=1e-9
     )
-    held = orientation_block(found).held["orientation_parts_deg"]
+    held = orientation_block(found).in_json["orientation_parts_deg"]
     assert held["rotation_vector"]["rz"]["mean"] == pytest.approx(np.degrees(0.01))
     assert held["zxz"]["phi"]["max"] == pytest.approx(np.degrees(0.01))
 

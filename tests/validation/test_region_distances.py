@@ -114,7 +114,7 @@ def test_errors_that_grow_with_the_distance_are_told() -> None:
     (step,) = measure_farther(grows)
     assert step.code == "measure-more"
     assert "Calibrate with configurations that reach farther" in step.message
-    held = distance_block(grows).held["distance_from_training"]
+    held = distance_block(grows).in_json["distance_from_training"]
     assert (held["grows"], held["joints_deg"]) == (True, [])
     spans = grows.spans(grows.tip)
     assert [span.readings for span in spans] == [18] * 5

@@ -25,7 +25,7 @@ from truearm.engine.diagnose.simulated_calibrations import PredictedError, Simul
 from truearm.engine.document.document import Block, detail, say
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import Fit, Status
-from truearm.engine.programs.gauge import held_by
+from truearm.engine.programs.gauge import fixed_by
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.loads import joint_efforts
@@ -323,7 +323,7 @@ def proof_of(
     errors = [notice for notice in warnings if notice.level == "error"]
     repeated = [notice for notice in warnings if notice.code in _REPEATED]
     lower_bound = expected.lower_bound
-    held = [*held_by(fit)]
+    held = [*fixed_by(fit)]
     names, root = uncertain_names(fit), covariance_root(fit, fit.covariance_with_unfitted)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))

@@ -39,7 +39,7 @@ from truearm.engine.diagnose.expected_error import ExpectedError, expected_error
 from truearm.engine.diagnose.gain import NO_GAIN, Repeatability, repeatability
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
-from truearm.engine.document.document import Block, detail, each, held_by, leaves_of, say, under
+from truearm.engine.document.document import Block, detail, each, json_of, leaves_of, say, under
 from truearm.engine.document.records import Record
 from truearm.engine.document.summaries import error_line, errors_summary, expected_blocks, noise_blocks, selection_block
 from truearm.engine.document.tables import parameter_lines
@@ -175,7 +175,7 @@ class Calibration(Record):
             yield excluded_block(self.excluded)
         yield detail("" if self.advice or not sound else status, status=self.status.value)
         for leaf in leaves_of(self._further()):
-            yield replace(leaf, held={})
+            yield replace(leaf, in_json={})
         yield from expected_blocks(self.expected)
         if self.notes:
             yield say(notes=self.notes)
@@ -204,7 +204,7 @@ class Calibration(Record):
             "history": self.history,
             "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
             "parameters": list(self._parameters()),
-            **held_by(self._further()),
+            **json_of(self._further()),
         }
 
     def residuals(self) -> Residuals:

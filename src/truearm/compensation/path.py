@@ -45,7 +45,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.engine.command.split import MAKER, accept_argument, changed_since, refuse_unaccepted, told_of
+from truearm.engine.command.split import MAKER, accept_argument, changed_since, faults_of, refuse_unaccepted
 from truearm.engine.command.texts import positions_of
 from truearm.engine.diagnose.external_force import check_force
 from truearm.engine.document.document import Block, detail, say, under
@@ -239,7 +239,7 @@ def follow(asked: FollowPath) -> FollowedPath:
         refuse_unaccepted(arm, accepted)
     joints_are = joints_argument(asked.joints, arm)
     followed = _followed(asked, arm, joints_are)
-    notices = [*changed_since(asked.robot), *told_of(arm), *check_force([(arm, followed.joints[followed.best])])]
+    notices = [*changed_since(asked.robot), *faults_of(arm), *check_force([(arm, followed.joints[followed.best])])]
     if chosen and followed.calibrated:
         notices += _check_size(followed, correction_limit(calibrated), allowed)
     texts = _texts(asked, arm, followed, chosen, notices)

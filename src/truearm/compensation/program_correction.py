@@ -30,7 +30,7 @@ from truearm.engine.programs.chosen_targets import (
 from truearm.engine.programs.correction import Correction
 from truearm.engine.programs.expected_errors import expected_errors
 from truearm.engine.programs.fake_targets import nominal_robot
-from truearm.engine.programs.gauge import base_is_held, base_shift, best_agreement, flange_is_held
+from truearm.engine.programs.gauge import base_fixed, base_shift, best_agreement, flange_fixed
 from truearm.engine.programs.program import Edit, Language, Move, Program, Split
 from truearm.engine.programs.program_poses import Provenance, numbers_of, provenance
 from truearm.engine.programs.resolved_program import Between, RealTips, ResolvedProgram
@@ -127,9 +127,9 @@ def corrected_programs(
     nominal = nominal_robot(robot)
     kept = kept_by_choice(programs, choice)
     tools, frames = provenance(programs, cell, "tool", kept), provenance(programs, cell, "frame", kept)
-    if frames == "assumed" and base_is_held(robot) and not (choice.was_taught("frames") or choice.was_taught("points")):
+    if frames == "assumed" and base_fixed(robot) and not (choice.was_taught("frames") or choice.was_taught("points")):
         frames = "held"
-    if tools == "assumed" and flange_is_held(robot) and not choice.was_taught("tools"):
+    if tools == "assumed" and flange_fixed(robot) and not choice.was_taught("tools"):
         tools = "held"
     start, agreed = best_agreement(robot)
     flange = agreed

@@ -20,7 +20,7 @@ from truearm.engine.command.arguments import file_for
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text, refuse_other_separators
 from truearm.engine.data.readers.cells import Cells, Layout, read_cells
-from truearm.engine.data.readers.rows import Configurations, found_configurations, in_order
+from truearm.engine.data.readers.rows import Configurations, in_order, row_configurations
 from truearm.engine.document.records import ImportedCircles
 from truearm.engine.robot.urdf_writing import joint_names
 
@@ -114,7 +114,7 @@ def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configur
     joints_are, names = joint_names(columns, f"{page.points}, line {cells.header}")
     joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"][0])
-    configurations = found_configurations(
+    configurations = row_configurations(
         cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are
     )
     if len(configurations.labels) < len(labels):

@@ -15,7 +15,7 @@ from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.base.files import exists
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import output_folder, write_files
-from truearm.engine.document.document import Block, detail, held_by, say
+from truearm.engine.document.document import Block, detail, json_of, say
 from truearm.engine.document.records import Record
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
@@ -171,7 +171,7 @@ class Fleet(Record):
 
     def content(self) -> dict[str, Any]:
         """Return what ``fleet.json`` holds, in mm: the same however the parts were computed."""
-        held = held_by(self.blocks())
+        held = json_of(self.blocks())
         del held["run"]
         return {"truearm": held["truearm"], **({"simulated": True} if self.simulated_from else {}), **held}
 

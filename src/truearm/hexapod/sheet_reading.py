@@ -16,7 +16,7 @@ from truearm.engine.base.units import COLUMN as SIMULATED
 from truearm.engine.data.hexapod import DEVICE, SOLUTIONS, Design, Device, designs
 from truearm.engine.data.readers.canonical import refuse_other_separators
 from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cells
-from truearm.engine.data.readers.rows import found_configurations
+from truearm.engine.data.readers.rows import row_configurations
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.urdf_writing import COLUMN, JOINT_COLUMN, joint_names
@@ -86,7 +86,7 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
     if any(JOINT_COLUMN.fullmatch(name) for name in columns):
         joints_are, joints = joint_names(columns, f"{path}, line {header}")
         at, units = zip(*(columns[name] for name in joints), strict=True)
-        configurations = found_configurations(cells, labels, at, units, joints_are)
+        configurations = row_configurations(cells, labels, at, units, joints_are)
     return Sheet(
         source=str(path),
         configurations=configurations,

@@ -19,7 +19,7 @@ from truearm.engine.data.dataset import IntArray
 from truearm.engine.data.inclinations import Inclinations, Instruments
 from truearm.engine.data.readers.canonical import refuse_other_separators
 from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cells
-from truearm.engine.data.readers.rows import Configurations, found_configurations, same_everywhere
+from truearm.engine.data.readers.rows import Configurations, row_configurations, same_everywhere
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.urdf_writing import COLUMN, JOINT_COLUMN, joint_names
 
@@ -72,7 +72,7 @@ def read_inclinations(path: Path) -> Inclinations:
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
     joints_are, names = joint_names(columns, f"{path}, line {header}")
-    configurations = found_configurations(
+    configurations = row_configurations(
         cells,
         cells.texts(columns["configuration"][0]),
         [columns[name][0] for name in names],

@@ -20,7 +20,7 @@ from truearm.engine.command.groups import (
     Repeatable,
     SeenBy,
 )
-from truearm.engine.command.kinds import File, Names, Number, Text, Told, Whole
+from truearm.engine.command.kinds import Callback, File, Names, Number, Text, Whole
 from truearm.engine.command.request import as_in, job, option, required
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
         more="None waits until all is measured, or Ctrl-C.",
     )
     tell: Callable[[str], None] = option(
-        Told(),
+        Callback(),
         "Called with a line for each reading, and for what could not be read",
         default=_silent,
         word="",

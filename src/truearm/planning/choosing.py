@@ -327,7 +327,7 @@ def plan_measurements(
     refuse_clearance_of(seen, constraints, where)
     kept = dict(allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin))
     if finder is not None:
-        kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}
+        kept |= {name: keeps for name, keeps in finder.check.clear_of(candidates.joints).items() if not keeps.all()}
     rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
     usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
     _refuse_too_few(poses, len(usable), len(candidates), rejected, labels is not None, drawn)
@@ -510,7 +510,7 @@ def _elsewhere(robot: Robot, finder: WayFinder | None, rng: np.random.Generator)
         return random_candidates(robot, _PREDICTED_CONFIGURATIONS, rng)
     low, high = joint_window(robot)
     some = rng.uniform(low, high, (_DRAWN_ELSEWHERE, len(low)))
-    clear = some[finder.check.room(some) >= finder.check.cell.clearance]
+    clear = some[finder.check.smallest_distance(some) >= finder.check.cell.clearance]
     return _forward((clear if len(clear) >= _FEWEST_ELSEWHERE else some)[:_PREDICTED_CONFIGURATIONS])
 
 

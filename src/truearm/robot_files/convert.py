@@ -18,7 +18,7 @@ from truearm.engine.command.arguments import (
     readings_argument,
     robot_argument,
 )
-from truearm.engine.command.split import told_of
+from truearm.engine.command.split import faults_of
 from truearm.engine.data.controller_joints import in_controller_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.robodk import robodk_csv
@@ -106,7 +106,7 @@ def exported_robot(asked: ExportRobot) -> ExportedRobot:
         made = FORMATS[asked.format](robot)
     if file is not None:
         write_new_text(file, made.text)
-    return ExportedRobot(robot, asked.format, made.text, made.frames, made.left_out, file, tuple(told_of(robot)))
+    return ExportedRobot(robot, asked.format, made.text, made.frames, made.left_out, file, tuple(faults_of(robot)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -25,7 +25,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.engine.command.split import told_of
+from truearm.engine.command.split import faults_of
 from truearm.engine.command.texts import positions_of
 from truearm.engine.data.readers.configurations import read_poses
 from truearm.engine.diagnose.external_force import check_force
@@ -187,7 +187,7 @@ def found_joints(asked: FindJoints) -> JointTable:
         )
     if file is not None:
         write_text(file, joints_csv(solutions, labels, arm.joints, counting(arm, joints_are)))
-    told = (*told_of(arm), *check_force([(arm, solutions.joints[solutions.usable])]))
+    told = (*faults_of(arm), *check_force([(arm, solutions.joints[solutions.usable])]))
     notices = (*told, *_other_frame(arm, asked.frame, asked.target))
     return JointTable(labels, solutions, notices, joints_are, arm.simulated_from)
 

@@ -63,7 +63,7 @@ class RobotList(Record):
                     "source": robot.source,
                 }
             )
-        yield Table(("id", "maker", "joints", "reach", "controller", "robot"), rows, held={"robots": held})
+        yield Table(("id", "maker", "joints", "reach", "controller", "robot"), rows, in_json={"robots": held})
 
 
 def listed_robots(asked: ListRobots) -> RobotList:

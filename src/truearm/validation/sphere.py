@@ -21,7 +21,7 @@ from truearm.engine.command.arguments import (
     refuse_swapped,
     robot_argument,
 )
-from truearm.engine.command.split import changed_since, told_of
+from truearm.engine.command.split import changed_since, faults_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.document.document import Block, each, say
 from truearm.engine.document.records import Record
@@ -231,7 +231,7 @@ def judged(asked: JudgeSphere) -> SphereTests:
         _spheres(arm, measured, at_ball),
         asked.taught_at,
         asked.again,
-        (*changed_since(asked.robot), *told_of(arm)),
+        (*changed_since(asked.robot), *faults_of(arm)),
         files_of(asked.robot, asked.data),
         parts_of((arm, measured)),
     )

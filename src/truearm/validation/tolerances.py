@@ -143,7 +143,7 @@ class UsedTolerances(Record):
             )
             for row in held
         ]
-        yield Table(heading, rows, held={"joints": held})
+        yield Table(heading, rows, in_json={"joints": held})
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from truearm.calibration.parts import curve_block
 from truearm.engine.diagnose.curves import FoundCurve, found_curves
-from truearm.engine.document.document import held_by, lines_of
+from truearm.engine.document.document import json_of, lines_of
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
@@ -73,7 +73,7 @@ def test_the_strongest_periods_are_told_with_their_neighbours() -> None:
     assert line.endswith("0.0091 +- 0.0004 deg rms, strongest at 1, 28 and 58 periods a turn")
     (line,) = lines_of([curve_block(curve({1: 1.414214}, EVERYWHERE))])
     assert line == "Joint 2: curve of 0.0010 +- 0.0004 deg rms, strongest at 1 period a turn"
-    summary = held_by([curve_block(found)])
+    summary = json_of([curve_block(found)])
     assert list(summary) == ["joint", "rms_mdeg", "rms_deviation_mdeg", "strongest", "measured_deg"]
     assert summary["strongest"][1] == {"periods": [1, 1], "amplitude_mdeg": pytest.approx(3.0)}
     assert summary["measured_deg"] == [[-180.0, 180.0]]

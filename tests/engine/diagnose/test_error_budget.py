@@ -14,7 +14,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import table_motion, without_table_motion
 from truearm.engine.diagnose.error_budget import ErrorBudget, Source, error_budget
 from truearm.engine.diagnose.expected_error import expected_error
-from truearm.engine.document.document import held_by, lines_of
+from truearm.engine.document.document import json_of, lines_of
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import MODELS
 from truearm.engine.robot.chain import Array
@@ -72,7 +72,7 @@ def test_the_shares_add_up_to_the_held_out_square() -> None:
     budget, *_ = judged("tracker-triangular", 40, 0.02e-3, 1)
     shares = [share.square for share in budget.shares if share.square is not None]
     assert sum(shares) == pytest.approx(budget.square, rel=1e-12)
-    summary = held_by([budget_block(budget)])["limits_of_accuracy"]
+    summary = json_of([budget_block(budget)])["limits_of_accuracy"]
     assert sum(s["square_mm2"] or 0.0 for s in summary["shares"]) == pytest.approx(summary["rms_mm"] ** 2, rel=1e-9)
     (line,) = lines_of([budget_block(budget)])
     parts = line.split("; ")[0].split(": ")[1].split(", ")

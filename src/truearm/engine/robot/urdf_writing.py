@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.base.units import said_of, written
+from truearm.engine.base.units import mark_lines, written
 from truearm.engine.robot.chain import Array, Element
 from truearm.engine.robot.controller import Controller, JointsOf
 from truearm.engine.robot.effects.balancing import Balancing
@@ -87,7 +87,7 @@ def comments(robot: Robot, frame: str, left: Sequence[str]) -> list[str]:
     """Return what the head of a file says in its comments, each one line without control characters."""
     title = robot.title if robot.title == robot.name else f"{robot.name}: {robot.title}"
     said = [
-        *said_of(robot.simulated_from),
+        *mark_lines(robot.simulated_from),
         f"{title}, written by truearm",
         frame,
         *left,
@@ -197,7 +197,7 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
     said = left_out(robot, "A URDF")
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
-        *(f"<!-- {line} -->" for line in said_of(robot.simulated_from)),
+        *(f"<!-- {line} -->" for line in mark_lines(robot.simulated_from)),
         f"<robot name={quoteattr(robot.name)}>",
         '  <link name="base_link"/>',
     ]

@@ -374,10 +374,10 @@ class StatedCell:
         broken = [name for name, held in kept.items() if not held.all()]
         if broken:
             return f"{', '.join(broken)} of the constraints"
-        rooms = self.check.rooms(joints)
-        if not rooms.size or rooms.min() >= self.check.need:
+        distances = self.check.distances(joints)
+        if not distances.size or distances.min() >= self.check.need:
             return ""
-        return self._near(int(np.unravel_index(int(np.argmin(rooms)), rooms.shape)[0]), float(rooms.min()))
+        return self._near(int(np.unravel_index(int(np.argmin(distances)), distances.shape)[0]), float(distances.min()))
 
     def unsuited(self, plan: PerformancePlan) -> str:
         """Return which ways of a plan cannot be driven, in words; nothing if all can."""
@@ -388,9 +388,9 @@ class StatedCell:
         near = {}
         for name, joints in ways.items():
             looked = self.check.ways(joints[:-1], joints[1:])
-            if len(looked.room) and looked.room.min() < self.cell.clearance:
-                at = int(np.argmin(looked.room))
-                near[name] = (float(looked.room[at]), int(looked.worst[at]))
+            if len(looked.distance) and looked.distance.min() < self.cell.clearance:
+                at = int(np.argmin(looked.distance))
+                near[name] = (float(looked.distance[at]), int(looked.worst[at]))
         if not near:
             return ""
         worst = sorted(near, key=lambda name: near[name][0])
@@ -519,12 +519,12 @@ def _near(robot: Robot, ways: Mapping[str, Array]) -> list[Notice]:
     cell = cell_argument(robot, None, "")
     check = CollisionCheck(robot, cell)
     looked = {name: check.ways(joints[:-1], joints[1:]) for name, joints in ways.items() if len(joints) > 1}
-    near = {name: at for name, at in looked.items() if at.room.min() < cell.clearance}
+    near = {name: at for name, at in looked.items() if at.distance.min() < cell.clearance}
     if not near:
         return []
-    worst = min(near, key=lambda name: float(near[name].room.min()))
-    at = int(np.argmin(near[worst].room))
-    room = max(float(near[worst].room[at]), 0.0)
+    worst = min(near, key=lambda name: float(near[name].distance.min()))
+    at = int(np.argmin(near[worst].distance))
+    room = max(float(near[worst].distance[at]), 0.0)
     return [
         WAYS_NEAR(
             f"On {len(near)} of {len(looked)} ways the arm comes within {cell.clearance * 1e3:g} mm of the floor or of "

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 from truearm.calibration.result import RESULT_FILES
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.files import exists, read_text
-from truearm.engine.base.units import said_of
+from truearm.engine.base.units import mark_lines
 from truearm.engine.data.excluded import read_exclusions
 from truearm.studio import words
 from truearm.studio.evaluated_with import OTHER_ROBOT, OTHER_SETTINGS
@@ -67,7 +67,7 @@ class ProofPage:
             return
         result = _read_result(folder / "result.json")
         try:
-            made, marks = made_with(result, self._window.calibrated()), said_of(result.get("simulated_parts", ()))
+            made, marks = made_with(result, self._window.calibrated()), mark_lines(result.get("simulated_parts", ()))
             about = [*marks, f"Of {made.line()}.", f"Status: {result['status']}"]
             shown_figures = words.lines(about) + figures_table(result)
             warnings = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]

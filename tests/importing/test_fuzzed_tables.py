@@ -97,15 +97,15 @@ def drawn(rng: np.random.Generator) -> Table:
     return Table(written(sound), written(odd), mapping, row, column, len(above) + 2 + row, text)
 
 
-def same_elsewhere(one: Dataset, other: Dataset, row: int) -> bool:
-    kept = np.arange(len(one.target)) != row
+def same_elsewhere(first: Dataset, second: Dataset, row: int) -> bool:
+    elsewhere = np.arange(len(first.target)) != row
     return all(
-        np.array_equal(a[kept], b[kept], equal_nan=True)
+        np.array_equal(a[elsewhere], b[elsewhere], equal_nan=True)
         for a, b in (
-            (one.position, other.position),
-            (one.joints, other.joints),
-            (np.asarray(one.sigma), np.asarray(other.sigma)),
-            (np.asarray(one.temperature), np.asarray(other.temperature)),
+            (first.position, second.position),
+            (first.joints, second.joints),
+            (np.asarray(first.sigma), np.asarray(second.sigma)),
+            (np.asarray(first.temperature), np.asarray(second.temperature)),
         )
     )
 
@@ -124,11 +124,11 @@ def finding(case: int, folder: Path) -> str:
     except InputError as error:
         place = f"line {table.line}"
         cell = f"{place}, column {NAMES[table.column]}"
-        told = str(error)
+        message = str(error)
         if structure:
-            return "" if "line " in told or "quotes" in told else told
-        overlaps = NAMES[table.column] == "When" and "column When" in told  # the other of two that coincide
-        return "" if cell in told or overlaps else f"{table.text!r} in {cell}: {told}"
+            return "" if "line " in message or "quotes" in message else message
+        overlaps = NAMES[table.column] == "When" and "column When" in message  # the other of two that coincide
+        return "" if cell in message or overlaps else f"{table.text!r} in {cell}: {message}"
     if structure:
         return ""
     number = as_number(table.text.replace(",", ".") if "decimal: comma" in table.mapping else table.text)
@@ -139,8 +139,8 @@ def finding(case: int, folder: Path) -> str:
 
 
 def test_odd_cells_are_refused_by_their_place(tmp_path: Path) -> None:
-    found = [f"{case}: {words}" for case in range(COUNT) if (words := finding(case, tmp_path))]
-    assert not found, "\n".join(found[:20])
+    findings = [f"{case}: {words}" for case in range(COUNT) if (words := finding(case, tmp_path))]
+    assert not findings, "\n".join(findings[:20])
 
 
 def test_a_guess_of_a_damaged_table_is_a_guess_or_a_refusal(tmp_path: Path) -> None:

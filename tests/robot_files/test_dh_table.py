@@ -130,9 +130,9 @@ def test_table_of_ur5_is_the_makers() -> None:
 def test_table_of_modified_robot_is_its_own() -> None:
     robot = load_robot("irb120")  # Nubiola's modified DH table, Table 2.6
     expected = [[joint.row[c] for c in ("a", "alpha", "d", "theta_offset")] for joint in robot.joints]
-    found = numbers(dh_table(robot, "modified-dh"))
-    turns = (found - expected)[:, [1, 3]] / (2 * math.pi)
-    assert_allclose(found[:, [0, 2]], np.array(expected)[:, [0, 2]], rtol=0, atol=1e-15)
+    table = numbers(dh_table(robot, "modified-dh"))
+    turns = (table - expected)[:, [1, 3]] / (2 * math.pi)
+    assert_allclose(table[:, [0, 2]], np.array(expected)[:, [0, 2]], rtol=0, atol=1e-15)
     assert_allclose(turns, np.round(turns), rtol=0, atol=1e-15)
 
 

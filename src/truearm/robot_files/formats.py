@@ -163,7 +163,7 @@ def _balancer(b: Balancer) -> dict[str, Any]:
 
 
 def _elements(robot: Robot, elements: Iterable[Element]) -> list[dict[str, Any]]:
-    found = []
+    entries = []
     for element in elements:
         value = element.value if element.parameter is None else robot.values[element.parameter]
         entry: dict[str, Any] = {"motion": element.motion, "value": value}
@@ -173,8 +173,8 @@ def _elements(robot: Robot, elements: Iterable[Element]) -> list[dict[str, Any]]
             entry["parameter"] = element.parameter
         if element.variable is not None:
             entry["joint"] = element.variable + 1
-        found.append(entry)
-    return found
+        entries.append(entry)
+    return entries
 
 
 def _parameter(p: Parameter) -> dict[str, Any]:
@@ -222,8 +222,8 @@ def python_text(robot: Robot, comments: Sequence[str]) -> str:
 
 def _description(robot: Robot, comments: Sequence[str]) -> str:
     count = len(robot.joints)
-    said = [line for comment in comments for line in (*wrap(comment, _WIDTH), "")]
-    text = "\n".join(said).replace("\\", "\\\\").replace('"', '\\"')
+    lines = [line for comment in comments for line in (*wrap(comment, _WIDTH), "")]
+    text = "\n".join(lines).replace("\\", "\\\\").replace('"', '\\"')
     return f'''"""{text}
 Only NumPy is needed, and nothing of truearm. Run as a program, the file compares itself with stored poses.
 
@@ -300,8 +300,8 @@ def _bodies(robot: Robot) -> tuple[list[tuple[Row, Row]], list[tuple[int, float,
         """Return a point of a link in the frame behind its joint, or of the base."""
         if link == 0:
             return point
-        there = robot.axial_slides.stayed(link, (point[0], point[1], point[2]), robot.values)
-        return _tidy((inverses[link - 1] @ behind[link - 1] @ [*there, 1.0])[:3])
+        stayed = robot.axial_slides.stayed(link, (point[0], point[1], point[2]), robot.values)
+        return _tidy((inverses[link - 1] @ behind[link - 1] @ [*stayed, 1.0])[:3])
 
     masses = [(mass.joint - 1, mass.mass, seen(mass.joint, mass.cog)) for mass in robot.masses if mass.mass]
     balancers: list[tuple[object, ...]] = []
@@ -386,16 +386,18 @@ def exported(robot: Robot, format_: str) -> Export:
 
 
 def _table(robot: Robot, convention_name: TableConvention) -> Export:
-    made = converted(_in_base(robot), convention_name)
-    units = made.convention.row_units("revolute")
-    rows = tuple(DHRow(j.name, j.kind, **{c: _tidy_export(v, units[c]) for c, v in j.row.items()}) for j in made.joints)
-    table = DHTable(convention_name, rows, made.base, made.flange)
+    in_convention = converted(_in_base(robot), convention_name)
+    units = in_convention.convention.row_units("revolute")
+    rows = tuple(
+        DHRow(j.name, j.kind, **{c: _tidy_export(v, units[c]) for c, v in j.row.items()}) for j in in_convention.joints
+    )
+    table = DHTable(convention_name, rows, in_convention.base, in_convention.flange)
     name = "A table"
     limits = [f"{name} cannot hold the limits of joints."] if any(joint.limits for joint in robot.joints) else []
     left = (*left_out(robot, name), *masses_left_out(robot, name), *limits)
-    frame = f"{frames(robot)} {first_frame_remark(made.base)}"
-    said = [*comments(robot, frame, left), f"convention {convention_name}: link = {_PRODUCTS[convention_name]}"]
-    return Export(complete_dh_csv(table, said), frame, left)
+    frame = f"{frames(robot)} {first_frame_remark(in_convention.base)}"
+    remarks = [*comments(robot, frame, left), f"convention {convention_name}: link = {_PRODUCTS[convention_name]}"]
+    return Export(complete_dh_csv(table, remarks), frame, left)
 
 
 def _tidy_export(value: float, unit: str) -> float:
@@ -405,11 +407,11 @@ def _tidy_export(value: float, unit: str) -> float:
 
 def _urdf(robot: Robot) -> Export:
     text, left = urdf_text(robot)
-    first, _, rest = text.partition("\n")
+    first, _, body = text.partition("\n")
     frame = f"{frames(robot)} They are the links tool0 and base_link."
-    said = without_mark(comments(robot, frame, left))  # which the URDF has already
-    said = [re.sub("-(?=-)", "- ", line) for line in said]  # XML comments hold no two hyphens
-    return Export("\n".join([first, "<!--", *said, "-->", rest]), frame, tuple(left))
+    remarks = without_mark(comments(robot, frame, left))  # which the URDF has already
+    remarks = [re.sub("-(?=-)", "- ", line) for line in remarks]  # XML comments hold no two hyphens
+    return Export("\n".join([first, "<!--", *remarks, "-->", body]), frame, tuple(left))
 
 
 def _json(robot: Robot) -> Export:
@@ -419,14 +421,14 @@ def _json(robot: Robot) -> Export:
 
 
 def _python(robot: Robot) -> Export:
-    held = [*(effect.name for effect in robot.effects if effect.exportable), Balancing.name]
-    left = tuple(left_out(robot, "A Python file", held))
+    known = [*(effect.name for effect in robot.effects if effect.exportable), Balancing.name]
+    left = tuple(left_out(robot, "A Python file", known))
     return Export(python_text(_in_base(robot), comments(robot, frames(robot), left)), frames(robot), left)
 
 
 def _ur_kinematics(robot: Robot) -> Export:
-    text, said = kinematics_text(_in_base(robot))
-    left = (*left_out(robot, KINEMATICS_FILE), *said)
+    text, losses = kinematics_text(_in_base(robot))
+    left = (*left_out(robot, KINEMATICS_FILE), *losses)
     frame = f"{frames(robot)} They are base_link_inertia and tool0 of ur_description."
     head = "".join(f"# {line}\n" for line in comments(robot, frame, left))
     return Export(head + text, frame, left)

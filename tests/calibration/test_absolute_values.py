@@ -17,7 +17,7 @@ from truearm.calibration.calibrate import calibrate
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.fit.fit import Fit, Status, identify, refit_draws
-from truearm.engine.fit.held import Held
+from truearm.engine.fit.fixed_places import FixedPlaces
 from truearm.engine.fit.models import named_model
 from truearm.engine.fit.problem import Problem
 from truearm.engine.fit.rounds import find_parameters
@@ -30,7 +30,7 @@ from truearm.engine.twin.devices.calibration_table import CalibrationTable
 from truearm.engine.twin.twin import Twin, measure
 from truearm.simulation.jobs import simulate
 
-KNOWN = Held(IDENTITY, {TIP: IDENTITY})
+KNOWN = FixedPlaces(IDENTITY, {TIP: IDENTITY})
 LOSSES: dict[str, Any] = {"l1": "distances", "l1-components": "components"}
 OFFSETS, GEOMETRIC = named_model("offsets"), named_model("geometric")
 
@@ -46,7 +46,7 @@ def rolled(seed: int = 3) -> tuple[Robot, Dataset]:
 
 def bounded(loss: Any, **more: Any) -> Fit:
     return identify(
-        believed(arm()), rolled()[1], GEOMETRIC, loss=loss, redundancy="none", bounds=BOUNDS, held=KNOWN, **more
+        believed(arm()), rolled()[1], GEOMETRIC, loss=loss, redundancy="none", bounds=BOUNDS, fixed=KNOWN, **more
     )
 
 
@@ -100,12 +100,12 @@ def test_what_neither_readings_nor_bounds_determine_is_a_loss_of_rank() -> None:
     robot = arm()
     rng = np.random.default_rng(2)
     data = measure(Twin(robot), robot.random_configurations(25, rng), 0.1e-3, rng)
-    alone = identify(robot, data, GEOMETRIC, redundancy="none", held=KNOWN)
+    alone = identify(robot, data, GEOMETRIC, redundancy="none", fixed=KNOWN)
     assert alone.status is Status.RANK_LOSS
     assert {"d_2", "d_3"} <= set(alone.unobservable)
     assert alone.parameter_status("d_2") == "not-determined"
     assert not alone.redundancies
-    within = identify(robot, data, GEOMETRIC, redundancy="none", held=KNOWN, bounds=BOUNDS)
+    within = identify(robot, data, GEOMETRIC, redundancy="none", fixed=KNOWN, bounds=BOUNDS)
     assert within.status in (Status.CONVERGED, Status.AT_BOUND)
     # Nothing is known worse than if it were anywhere between its bounds.
     lengths = [i for i, p in enumerate(within.free.parameters) if p.unit == "m"]
@@ -117,7 +117,7 @@ def test_what_neither_readings_nor_bounds_determine_is_a_loss_of_rank() -> None:
 
 def test_draws_depend_on_their_seed_alone() -> None:
     _, data = rolled()
-    solved = find_parameters(believed(arm()), data, OFFSETS, loss="l1", held=KNOWN)
+    solved = find_parameters(believed(arm()), data, OFFSETS, loss="l1", fixed=KNOWN)
     said: list[str] = []
     first, again, other = (refit_draws(solved, "l1", 20, seed, said.append) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
@@ -143,7 +143,7 @@ def test_intervals_of_a_bootstrap_hold_what_they_say() -> None:
     for trial in range(30):
         rng = np.random.default_rng((trial, 7))
         data = measure(Twin(robot), robot.random_configurations(20, rng), 0.2e-3, rng)
-        found = identify(robot, data, OFFSETS, redundancy="none", held=KNOWN, bootstrap=20, seed=trial)
+        found = identify(robot, data, OFFSETS, redundancy="none", fixed=KNOWN, bootstrap=20, seed=trial)
         for name in ("theta_offset_1", "theta_offset_2", "theta_offset_3"):
             p = found.robot.parameters[name]
             inside.append(abs(p.value - robot.values[name]) <= 1.96 * known(p.deviation))

@@ -99,7 +99,7 @@ def test_what_is_held_stays_and_the_rest_is_found(tmp_path: Path) -> None:
         twin = exact()[0].robot
         assert found.nominal.position is not None, hold
         assert all(apart(found.robot, twin, target.name) < 1e-9 for target in twin.targets), hold
-        names = found.fit.held.names(found.robot)
+        names = found.fit.fixed.names(found.robot)
         assert names, hold
         for name in names:
             if not name.startswith("base_r"):

@@ -60,7 +60,7 @@ from truearm.engine.diagnose.simulated_calibrations import (
 )
 from truearm.engine.fit.bounds import Bounds, read_bounds
 from truearm.engine.fit.fit import Fit, Status, identify, place
-from truearm.engine.fit.held import Held
+from truearm.engine.fit.fixed_places import FixedPlaces
 from truearm.engine.fit.likelihood import WhitenedProblem
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import FRAMES, Model, named_model
@@ -199,7 +199,7 @@ class _Read:
     readings: Dataset  #: Those that count.
     sha256: str | None  #: Of their file.
     excluded: tuple[Excluded, ...]
-    held: Held
+    held: FixedPlaces
     how: _How
     zones: WantedZones | None
 
@@ -347,7 +347,7 @@ def _identified(asked: Calibrate, given: _Read, parts: _Parts) -> _Found:
                 first,
                 model,
                 **given.how,
-                held=given.held,
+                fixed=given.held,
                 bootstrap=asked.bootstrap,
                 seed=asked.seed,
                 progress=asked.progress,
@@ -454,7 +454,7 @@ def _history(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> st
 
 
 def _beside_nominal(
-    placed: Robot, fit: Fit, training: Dataset, held_out: Dataset | None, noticed: Sequence[Notice], held: Held
+    placed: Robot, fit: Fit, training: Dataset, held_out: Dataset | None, noticed: Sequence[Notice], held: FixedPlaces
 ) -> list[Notice]:
     """Say what the held-out part tells of the calibrated robot beside the nominal one.
 

@@ -11,7 +11,7 @@ import numpy as np
 from truearm.engine.base.errors import InputError, did_you_mean, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.programs.cell import KnownPlace, read_known_places
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
@@ -22,7 +22,7 @@ _ALL: Final = ("targets", "fixtures")
 _AS_BASE: Final = "quaternion: [1, 0, 0, 0]"
 
 
-def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Dataset) -> Held:
+def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Dataset) -> FixedPlaces:
     """Return what is held, with its places from a file.
 
     Args:
@@ -34,7 +34,7 @@ def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Datas
         InputError: If numbers are missing, if something is held that the readings do not have or do not see, or twice.
     """
     if not hold and frames is None:
-        return NOTHING_HELD
+        return NOTHING_FIXED
     if not hold:
         raise InputError(
             "frames are given, and nothing is held at them",
@@ -64,7 +64,7 @@ def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Datas
             came=_BASE,
             cure="Hold the fixtures too, whose places in the same frame are known, or leave the base out.",
         )
-    return Held(stands, on_flange, beside)
+    return FixedPlaces(stands, on_flange, beside)
 
 
 def _named(hold: Sequence[str], data: Dataset) -> tuple[bool, tuple[str, ...], tuple[str, ...]]:

@@ -166,8 +166,8 @@ class Calibration(Record):
             )
             yield detail(f"On the {trained}:", after)
         yield say(nominal=errors_summary(self.nominal), train=errors_summary(self.train))
-        if self.fit.held:
-            yield detail(f"Held at known places: {listed(self.fit.held.words)}", held=list(self.fit.held.words))
+        if self.fit.fixed:
+            yield detail(f"Held at known places: {listed(self.fit.fixed.words)}", held=list(self.fit.fixed.words))
         if self.without:
             left_out = f"{counted(len(self.without), 'configuration')} ({listed(self.without)})"
             yield say(f"Left out: {left_out}", without=list(self.without))

@@ -15,7 +15,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Status, identify
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import MODELS
 from truearm.engine.fit.problem import Problem
@@ -288,8 +288,10 @@ def test_joints_that_never_moved_are_a_loss_of_rank(still: list[int]) -> None:
     twin, data = campaign("irb120", 40, 0.05e-3, 2)
     data = standing_still(twin, data, still)
     for redundancy in get_args(Redundant):
-        held = Held(twin.robot.base) if redundancy == "none" else NOTHING_HELD  # it needs something that is known
-        fit = identify(load_robot("irb120"), data, GEOMETRIC, redundancy=redundancy, held=held)
+        held = (
+            FixedPlaces(twin.robot.base) if redundancy == "none" else NOTHING_FIXED
+        )  # it needs something that is known
+        fit = identify(load_robot("irb120"), data, GEOMETRIC, redundancy=redundancy, fixed=held)
         assert fit.status is Status.RANK_LOSS, redundancy
         assert fit.unobservable
         assert all(fit.parameter_status(name) == "not-determined" for name in fit.unobservable)

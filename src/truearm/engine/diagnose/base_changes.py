@@ -22,8 +22,8 @@ from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.diagnose.unmodelled import LeftOver
 from truearm.engine.fit.fit import identify
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.frames import initial_frames
-from truearm.engine.fit.held import NOTHING_HELD, Held
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import Model
 from truearm.engine.fit.problem import Problem
@@ -115,7 +115,7 @@ def with_one_base(
     labels: Sequence[str],
     model: Model,
     loss: Loss = "linear",
-    held: Held = NOTHING_HELD,
+    held: FixedPlaces = NOTHING_FIXED,
 ) -> tuple[Dataset, list[Notice]]:
     """Return the data with all readings in the frame of the first part, and how far each part was moved.
 
@@ -130,7 +130,7 @@ def with_one_base(
         InputError: As :func:`parts_of`, and for a part with fewer than five training configurations.
     """
     part = checked_parts(data, training, labels)
-    moved, tools = data, Held(targets=held.targets)
+    moved, tools = data, FixedPlaces(targets=held.targets)
     bases = [
         initial_frames(robot, data.of_configurations(training[part[training] == number]), tools).base
         for number in range(int(part.max()) + 1)
@@ -144,12 +144,14 @@ def with_one_base(
     return moved, [_told(data, moved, part)]
 
 
-def _steps(robot: Robot, data: Dataset, part: NDArray[np.intp], model: Model, loss: Loss, held: Held) -> list[Motion]:
+def _steps(
+    robot: Robot, data: Dataset, part: NDArray[np.intp], model: Model, loss: Loss, held: FixedPlaces
+) -> list[Motion]:
     """Return the motion that takes each part's readings nearer to the frame of the first, one step of Gauss-Newton."""
     start = start_from_readings(model.prepared(robot), data, held)
     problem = Problem(start, data, model.free(start), {observation.name: 1.0 for observation in OBSERVATIONS})
     refuse_beyond("derivatives", problem.rows * len(problem.free.names), where=data.source)  # all are needed at once
-    fit = identify(robot, data, model, loss=loss, held=held)
+    fit = identify(robot, data, model, loss=loss, fixed=held)
     left = LeftOver.of(fit, data)
     base = [i for i, p in enumerate(fit.free.parameters) if p.group == "base"]
     parts = int(part.max())

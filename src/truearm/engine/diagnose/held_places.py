@@ -66,7 +66,7 @@ def check_held(
         data: The training readings.
         loss, redundancy, bounds, bounds_file: Of the fit.
     """
-    if not fit.held:
+    if not fit.fixed:
         return []
     priors = redundancy == "prior"
     try:
@@ -166,13 +166,13 @@ def _squares(fit: Fit, sigma: Mapping[str, float], data: Dataset) -> tuple[float
 
 def _apart(fit: Fit, found: Fit) -> Iterator[tuple[str, float]]:
     """Yield what is held: how far it is found from there, in words and by what is far."""
-    if fit.held.base is not None:
+    if fit.fixed.base is not None:
         place = _place(found.robot, "base", found.robot.base_quaternion)
-        yield _difference("the base", place, fit.held.base, turned=True)
+        yield _difference("the base", place, fit.fixed.base, turned=True)
     for target in found.robot.targets:
-        if target.name in fit.held.targets:
+        if target.name in fit.fixed.targets:
             place = _place(found.robot, target.parameter("x")[:-2], target.quaternion)
-            held = fit.held.targets[target.name]
+            held = fit.fixed.targets[target.name]
             yield _difference(f"target {target.name}", place, held, turned=target.quaternion is not None)
 
 

@@ -146,7 +146,7 @@ def check_narrow_data_without_geometry(
         return []
     model = named_model("geometric").also([e for e in fit.model.effects if e not in named_model("geometric").effects])
     nominal = fit.robot.with_values({name: p.nominal for name, p in fit.start.parameters.items()})
-    wider = identify(nominal, measured, model, loss=loss, held=fit.held)
+    wider = identify(nominal, measured, model, loss=loss, fixed=fit.fixed)
     expected = expected_error(as_residuals_allow(wider, measured))
     apart = _apart(fit, wider)
     low, high = expected.without_scale.interval_90

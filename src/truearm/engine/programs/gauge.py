@@ -76,9 +76,9 @@ def flange_is_held(robot: Robot) -> bool:
 
 def held_by(fit: Fit) -> tuple[str, ...]:
     """Return how a proof says what a fit has held."""
-    held = fit.held.names(fit.robot)
+    held = fit.fixed.names(fit.robot)
     targets = [name for name in held if fit.robot.parameters[name].group == "target"]
-    found = [BASE] if fit.held.base is not None else []
+    found = [BASE] if fit.fixed.base is not None else []
     if not _freedom_beside(fit.robot, targets).shape[1]:
         found.append(FLANGE)
     return (*found, *targets)

@@ -25,7 +25,7 @@ from truearm.engine.choosing.search import Gain
 from truearm.engine.choosing.selection import Candidate, Selection
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.curves import FoundCurve
+from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.document.drawing import DARK, deserved, logarithmic_axis, significant, student_975
 from truearm.engine.document.page import json_for_script
@@ -492,12 +492,12 @@ def test_the_shares_of_the_square_are_drawn_and_listed() -> None:
 # -- joint curves ------------------------------------------------------------------------------------------
 
 
-def curve(places: Array, deviation: float = 1.0) -> FoundCurve:
+def curve(places: Array, deviation: float = 1.0) -> FittedCurve:
     """Return a curve of 10 mdeg, 7 periods in a turn, of a joint from -120 to 150 deg; deviation of terms in mdeg."""
     amounts = np.zeros(120)
     amounts[12] = math.radians(0.010)
     shown = math.radians(-120), math.radians(150)
-    return FoundCurve(3, "J3", amounts, np.eye(120) * math.radians(deviation * 1e-3) ** 2, shown, np.radians(places))
+    return FittedCurve(3, "J3", amounts, np.eye(120) * math.radians(deviation * 1e-3) ** 2, shown, np.radians(places))
 
 
 @cache
@@ -537,7 +537,7 @@ def test_a_wide_band_outside_the_measured_range_does_not_flatten_the_curve() -> 
     found = curve(np.linspace(-60, 150, 60))
     amounts = np.zeros((120, 120))
     amounts[0, 0] = math.radians(1.0) ** 2  # the sine of one period: a degree, which no picture of 10 mdeg can hold
-    wide = FoundCurve(found.number, found.name, found.amounts, amounts, found.shown, np.radians([-5.0, 0.0, 5.0]))
+    wide = FittedCurve(found.number, found.name, found.amounts, amounts, found.shown, np.radians([-5.0, 0.0, 5.0]))
     bottom, top = curve_figure(wide)["layout"]["yaxis"]["range"]
     assert 100 < top - bottom < 2000  # the band has 170 mdeg to either side at 5 deg, 2000 at 90 deg
     (row,) = curves_table([curve(np.linspace(-60, 150, 60), deviation=0.1)]).rows

@@ -50,8 +50,8 @@ from truearm.engine.diagnose.base_changes import checked_parts, with_one_base
 from truearm.engine.diagnose.case import DOUBTED, PULLED, Case
 from truearm.engine.diagnose.data_check import notices_of
 from truearm.engine.diagnose.diagnosis import diagnose
+from truearm.engine.diagnose.fixed_places import check_fixed_places
 from truearm.engine.diagnose.gain import check_gain
-from truearm.engine.diagnose.held_places import check_held
 from truearm.engine.diagnose.simulated_calibrations import (
     SimulatedCalibrations,
     check_linear,
@@ -352,7 +352,7 @@ def _identified(asked: Calibrate, given: _Read, parts: _Parts) -> _Found:
                 seed=asked.seed,
                 progress=asked.progress,
             )
-    contradicted = check_held(robot, fit, first, **given.how)
+    contradicted = check_fixed_places(robot, fit, first, **given.how)
     return _Found(robot, placed, model, fit, selection, tuple(contradicted), tuple(notices))
 
 

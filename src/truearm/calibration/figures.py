@@ -16,7 +16,7 @@ from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.choosing.cross_validation import FOLDS
 from truearm.engine.choosing.selection import Selection
 from truearm.engine.choosing.zones import Box, shown_box
-from truearm.engine.diagnose.curves import FoundCurve
+from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.error_budget import ErrorBudget, Share, shown_shares
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
 from truearm.engine.document.document import Cell, Table
@@ -134,12 +134,12 @@ _NORMAL_95: Final = 1.959964
 _ROOM: Final = 4.0
 
 
-def curve_name(curve: FoundCurve) -> str:
+def curve_name(curve: FittedCurve) -> str:
     """Return the name of the place of its picture."""
     return f"joint-curve-{curve.number}"
 
 
-def curves_table(curves: Sequence[FoundCurve]) -> Table:
+def curves_table(curves: Sequence[FittedCurve]) -> Table:
     """Return a row for each curve; its band is the median one where it was measured."""
     rows = []
     for curve in curves:
@@ -160,7 +160,7 @@ def curves_table(curves: Sequence[FoundCurve]) -> Table:
     return Table(heading, rows, texts=(3, 4), name="curve-table", wide=True)
 
 
-def curve_figure(curve: FoundCurve) -> Figure:
+def curve_figure(curve: FittedCurve) -> Figure:
     """Show what a joint turns beyond its position, over its range; where nothing was measured the ground is grey."""
     value, deviation = (mdeg(1.0) * part for part in curve.at(curve.angles))
     low, high = value - _NORMAL_95 * deviation, value + _NORMAL_95 * deviation
@@ -220,7 +220,7 @@ def curve_figure(curve: FoundCurve) -> Figure:
     )
 
 
-def _measured(curve: FoundCurve) -> Array:
+def _measured(curve: FittedCurve) -> Array:
     """Return at which of its angles a curve was measured."""
     inside = np.zeros(len(curve.angles), dtype=bool)
     for low, high in curve.measured:

@@ -17,7 +17,7 @@ from truearm.engine.base.files import read_text
 from truearm.engine.base.units import SHOWN_AS, Marked, from_si, parts_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.curves import FoundCurve
+from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.error_budget import ErrorBudget, Share
 from truearm.engine.diagnose.expected_error import ExpectedError, covariance_root, uncertain_names
 from truearm.engine.diagnose.gain import NO_GAIN
@@ -133,7 +133,7 @@ def _is_sure(share: Share) -> bool:
     return share.square is not None and share.square > _SURE * share.deviation
 
 
-def curve_block(curve: FoundCurve) -> Block:
+def curve_block(curve: FittedCurve) -> Block:
     """Return size, strongest periods and measured ranges of a curve; told are amplitudes of half of the strongest."""
     *others, last = [one.range for one in curve.strongest if 2.0 * one.amplitude >= curve.strongest[0].amplitude]
     periods = f"{', '.join(others)} and {last}" if others else last

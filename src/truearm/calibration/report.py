@@ -379,7 +379,7 @@ def _limits(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
 
 
 def _expected(run: Calibration, drawn: dict[str, Figure]) -> Section:
-    shared = " and from what readings of a visit share" if run.expected.remainder else ""
+    shared = " and from what readings of a visit share" if run.expected.by_joint_error else ""
     words = (
         "Error of the targets' positions to expect, in the robot's base frame, mean over the joint positions that "
         f"bring them into a cell. It follows from the covariance of the parameters{shared}, without the noise of a "

@@ -33,7 +33,7 @@ from truearm.engine.choosing.zones import ZoneVerdict, flange_places
 from truearm.engine.command.reading import Excluded, excluded_block
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.curves import FoundCurve, found_curves
+from truearm.engine.diagnose.curves import FittedCurve, fitted_curves
 from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
 from truearm.engine.diagnose.expected_error import ExpectedError, expected_error
 from truearm.engine.diagnose.gain import NO_GAIN, Repeatability, repeatability
@@ -119,9 +119,9 @@ class Calibration(Record):
         return error_budget(self.fit, self.data, training, held_out, self.expected)
 
     @cached_property
-    def curves(self) -> tuple[FoundCurve, ...]:
+    def curves(self) -> tuple[FittedCurve, ...]:
         """The curves of the joints, where the model has some; see the effect ``joint-curve``."""
-        return found_curves(self.fit, self.data.of_configurations(self.training))
+        return fitted_curves(self.fit, self.data.of_configurations(self.training))
 
     @property
     def status(self) -> Status:

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from truearm.calibration.parts import curve_block
-from truearm.engine.diagnose.curves import FoundCurve, found_curves
+from truearm.engine.diagnose.curves import FittedCurve, fitted_curves
 from truearm.engine.document.document import held_by, lines_of
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
@@ -24,15 +24,15 @@ TURN = (-math.pi, math.pi)
 EVERYWHERE = np.linspace(-180, 180, 90)
 
 
-def curve(amplitudes: dict[int, float], places: Array, shown: tuple[float, float] = TURN) -> FoundCurve:
+def curve(amplitudes: dict[int, float], places: Array, shown: tuple[float, float] = TURN) -> FittedCurve:
     """Return a curve of sines with amplitudes in mdeg, measured at places in deg."""
     amounts = np.zeros(120)
     for periods, amplitude in amplitudes.items():
         amounts[2 * (periods - 1)] = math.radians(amplitude * 1e-3)
-    return FoundCurve(2, "J2", amounts, np.eye(120) * 1e-10, shown, np.radians(places))
+    return FittedCurve(2, "J2", amounts, np.eye(120) * 1e-10, shown, np.radians(places))
 
 
-def ranges(found: FoundCurve) -> list[list[float]]:
+def ranges(found: FittedCurve) -> list[list[float]]:
     return [[round(math.degrees(end), 3) for end in ends] for ends in found.measured]
 
 
@@ -85,7 +85,7 @@ def test_curves_of_a_fit_are_those_of_its_parameters() -> None:
     rng = np.random.default_rng(2)
     data = measure(twin, nominal.random_configurations(60, rng), 1e-5, rng)
     fit = identify(nominal, data, named_model("geometric").also(["joint-curve"]))
-    found = found_curves(fit, data)
+    found = fitted_curves(fit, data)
     q = np.linspace(-1.0, 1.0, 7)
     values, uncertain, covariance = fit.robot.values, (*fit.free.names, *fit.unfitted), fit.covariance_with_unfitted
     for one in found:
@@ -99,5 +99,5 @@ def test_curves_of_a_fit_are_those_of_its_parameters() -> None:
             assert one.covariance[place, place] == (0.0 if index is None else covariance[index, index])
     assert found
     without = replace(fit, robot=fit.robot.with_values({n: 0.0 for n in fit.free.names if n.startswith("curve_")}))
-    assert found_curves(without, data) == ()
-    assert found_curves(identify(nominal, data, named_model("geometric")), data) == ()
+    assert fitted_curves(without, data) == ()
+    assert fitted_curves(identify(nominal, data, named_model("geometric")), data) == ()

@@ -88,7 +88,7 @@ def test_closed_forms_of_one_joint(arm: Fit, tmp_path: Path) -> None:
 def test_an_error_of_every_visit_is_in_the_error_to_expect_and_makes_it_a_lower_bound(arm: Fit) -> None:
     fit = replace(arm, joint_error=np.array([1e-4]), weight=np.ones(10**6))
     found = expected_error(fit)
-    assert found.remainder == pytest.approx(0.5e-4, rel=1e-3)
+    assert found.by_joint_error == pytest.approx(0.5e-4, rel=1e-3)
     assert found.overall.mean == pytest.approx(0.5e-4 * np.sqrt(2 / np.pi), rel=0.02)
     assert found.overall.p95 == pytest.approx(0.5e-4 * 1.960, rel=0.05)
     low, high = found.overall.interval_90

@@ -20,7 +20,7 @@ class Port:
     """A campaign that listens, and a program that talks to it, in one thread."""
 
     def __init__(self, folder: Path) -> None:
-        self.listener = Listener(0, TOKEN, now=lambda: 5.0)
+        self.listener = Listener(0, TOKEN, clock=lambda: 5.0)
         session = Session(("P1", "P 2"), ("a", "b"), (), 10, Quality(deviation=5e-5))
         self.campaign = Campaign(session, self.listener, folder)
         self.streams: list[socket.socket] = []
@@ -129,7 +129,7 @@ def test_without_the_token_nothing_is_taken(port: Port) -> None:
         assert heard(stream) == ""
         assert port.codes == ["wrong-tokens"]
     assert len(port.campaign.session) == 0
-    assert TOKEN not in "".join(port.listener.told())
+    assert TOKEN not in "".join(port.listener.messages())
 
 
 def test_a_line_without_end_is_cut_off_early(port: Port) -> None:

@@ -45,7 +45,7 @@ class Folder:
         self.campaign = self.opened()
 
     def opened(self) -> Campaign:
-        source = WatchedFolder(self.inside, self.place / "map.yaml", LABELS, now=lambda: 7.0)
+        source = WatchedFolder(self.inside, self.place / "map.yaml", LABELS, clock=lambda: 7.0)
         quality = Quality(deviation=5e-5, samples=5)
         return Campaign(Session(LABELS, self.targets, ("n1",), 2, quality), source, self.out)
 
@@ -139,12 +139,12 @@ def test_a_broken_row_is_named_and_the_others_are_kept(watched: Folder) -> None:
     broken = ("P2,a,oops,2,3,2026-11-23 10:00:01,0.01,20,0\n", 'P2,"a,1,2\n', "P2,a,1\n", row("P2", "a", "nan"))
     watched.write(HEADER + row("P1", "a") + "".join(broken) + row("P3", "a", 4.0))
     assert watched.step() == ["P1/a", "P3/a"]
-    said = watched.campaign.source.told()
+    said = watched.campaign.source.messages()
     assert [f"points.csv, line {n}" in text for n, text in zip((3, 4, 5, 6), said, strict=True)] == [True] * 4
     (notice,) = watched.campaign.source.notices
     assert notice.code == "rows-broken"
     assert "4 rows could not be read" in notice.message
-    assert watched.campaign.source.told() == []
+    assert watched.campaign.source.messages() == []
 
 
 def test_every_fault_that_the_table_tells_sets_its_row_aside(watched: Folder) -> None:
@@ -254,7 +254,7 @@ joints: {file: plan.csv}
     (of.inside / "wide.csv").write_bytes(text.encode("utf-16"))
     beyond = [f"row 4/{name} unknown-configuration" for name in "ab"]
     assert of.step() == ["P1/a", "P1/b", "P3/a", "P3/b no-reading", *beyond]
-    assert "line 5" in of.campaign.source.told()[0]
+    assert "line 5" in of.campaign.source.messages()[0]
 
 
 def test_poses_are_read_and_wrong_quaternions_named(made: Callable[..., Folder]) -> None:
@@ -274,4 +274,4 @@ joints: {file: plan.csv}
     assert reading.quaternion.tolist() == [0.6, 0.8, 0.0, 0.0]
     assert reading.sigma == pytest.approx(2e-5)
     assert reading.time == 7.0
-    assert "length 1" in of.campaign.source.told()[0]
+    assert "length 1" in of.campaign.source.messages()[0]

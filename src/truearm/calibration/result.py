@@ -94,8 +94,8 @@ class Calibration(Record):
         """The calibrated robot, base and targets included, with what the calibration knows about it."""
         training = self.data.of_configurations(self.training)
         proof = proof_of(self.fit, self.status, self.warnings, self.expected, training, self.known_before)
-        found = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
-        return sealed(found, proof)
+        calibrated = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
+        return sealed(calibrated, proof)
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -137,9 +137,9 @@ class Calibration(Record):
     @property
     def faults(self) -> tuple[str, ...]:
         """What keeps it from replacing a sound result: a bad status, errors and ``no-gain``, by their codes."""
-        told = [self.status.value] if self.status.value not in SOUND else []
-        told += [notice.code for notice in self.warnings if notice.level == "error" or notice.code == NO_GAIN.code]
-        return tuple(dict.fromkeys(told))
+        codes = [self.status.value] if self.status.value not in SOUND else []
+        codes += [notice.code for notice in self.warnings if notice.level == "error" or notice.code == NO_GAIN.code]
+        return tuple(dict.fromkeys(codes))
 
     @property
     def advice(self) -> str:
@@ -278,8 +278,8 @@ class Calibration(Record):
     @property
     def written(self) -> tuple[str, ...]:
         """Names of the files that are written: those of every calibration, and of the zones that are kept."""
-        kept = [] if self.zones is None else [robot_file_of(verdict.box.name) for verdict in self.zones.kept]
-        return (*RESULT_FILES, *([ZONES_FILE] if kept else []), *kept)
+        zone_names = [] if self.zones is None else [robot_file_of(verdict.box.name) for verdict in self.zones.kept]
+        return (*RESULT_FILES, *([ZONES_FILE] if zone_names else []), *zone_names)
 
     def zone_robot(self, verdict: ZoneVerdict) -> Robot:
         """Return the calibrated robot of a zone, with what is known about it.
@@ -293,8 +293,8 @@ class Calibration(Record):
         if fit is None or self.zones is None:
             raise InputError("this zone has no model of its own", parameter="verdict", came=verdict.box.name)
         training = self.data.of_configurations(self.training)
-        mine = np.flatnonzero(verdict.box.holds(flange_places(self.fit.start, training.postures), self.zones.overlap))
-        part = training.of_configurations(mine)
+        inside = np.flatnonzero(verdict.box.holds(flange_places(self.fit.start, training.postures), self.zones.overlap))
+        part = training.of_configurations(inside)
         proof = proof_of(fit, fit.status, self.warnings, expected_error(fit), part, self.known_before)
         line = f"{self.history}, zone {verdict.box.name}"
         return sealed(replace(fit.robot, history=(*fit.robot.history, line), tools={}, truths={}), proof)

@@ -286,7 +286,7 @@ def _worst(rows: _Rows, residual: Array, out: list[int], taken: NDArray[np.intp]
     """Return the configuration that is off most, None if none is, and the mean square of what the others leave.
 
     Args:
-        now: What the fit without `taken` leaves, ``(rows,)``.
+        residual: What the fit without `taken` leaves, ``(rows,)``.
     """
     edges = np.array([part.start for part in rows.of])
     count = np.array([part.stop - part.start for part in rows.of])

@@ -458,7 +458,7 @@ def _bilinear(G: Array, g: Array, free_springs: list[int], start: Array, prior: 
     Args:
         G, g: Columns times columns, and times the residual; own columns of the free joints first, then four of each
             joint.
-        mine: The joints whose compliance is free.
+        free_springs: The joints whose compliance is free.
     """
     count, k = len(start), len(free_springs)
     c, p = start.copy(), np.zeros(4)

@@ -245,7 +245,7 @@ def identify(
             ones do no harm. ``drop``: no priors; redundant parameters are held at nominal and named. ``none``: no
             priors, and nothing is held; what neither bounds nor the readings determine ends in ``rank-loss``.
         bounds: Limits of parameter values.
-        held: Places that are known: they are not found.
+        fixed: Places that are known: they are not found.
         bootstrap: How many fits to configurations drawn anew the deviations follow from; 0: from the readings' own
             scatter.
         seed: Of those draws.

@@ -45,7 +45,7 @@ def initial_frames(robot: Robot, data: Dataset, fixed: FixedPlaces = NOTHING_FIX
     Args:
         robot: Its kinematic parameters are used as they are; its own base and targets are left out of account.
         data: At least one position reading; orientations are used where present.
-        held: Places that are known: those are not found, and the others agree with them.
+        fixed: Places that are known: those are not found, and the others agree with them.
 
     Raises:
         InputError: If no target has a position.

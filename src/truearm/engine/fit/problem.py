@@ -465,7 +465,7 @@ def find_redundancies(problem: Linearisable, vector: Array, fixed: Sequence[str]
     """Return the redundant parameters of a problem at `vector`, with their combinations.
 
     Args:
-        held: Parameters that are redundant elsewhere. If as many are redundant here, these stay the ones that are held.
+        fixed: Parameters that are redundant elsewhere. If as many are redundant here, these stay fixed.
     """
     A = _columns(problem, vector)
     names = problem.free.names
@@ -580,7 +580,7 @@ def unobservable_parameters(
 
     Args:
         free: The parameters to look at; all others are held.
-        held: Places that are known. A fixture among them locates the robot.
+        fixed: Places that are known. A fixture among them locates the robot.
     """
     free = free.without([SCALE])  # as much as is known of it beforehand is enough
     if not free.names:

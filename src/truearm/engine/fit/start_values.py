@@ -147,7 +147,7 @@ def start_from_readings(robot: Robot, data: Dataset, fixed: FixedPlaces = NOTHIN
     Args:
         robot: Its kinematic parameters are used as they are. Its own base and targets are left out of account where the
             data place them.
-        held: Places that are known: the robot, its targets and the fixtures are there.
+        fixed: Places that are known: the robot, its targets and the fixtures are there.
 
     Raises:
         InputError: If readings contradict each other about what a fixture is, or are too few or too much alike to place

@@ -16,7 +16,7 @@ def with_controller_kinematics(robot: Robot, stated: str, folder: Path) -> Robot
     """Return a robot with what its controller computes with.
 
     Args:
-        said: ``nominal``, ``proprietary``, ``unknown`` or the name of a file.
+        stated: ``nominal``, ``proprietary``, ``unknown`` or the name of a file.
         folder: Where such a file lies if its name is no whole path.
 
     Raises:

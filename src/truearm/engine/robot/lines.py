@@ -100,7 +100,7 @@ def common_normal(axis: JointAxis, following: JointAxis, before: Array, origin: 
     Args:
         before: The x direction of the frame on `axis`: of two opposite normals the one nearer to it is taken, so that
             joint zeros stay what they were; where both are as near, the one that points to `following`.
-        here: Origin of that frame, on `axis`.
+        origin: Origin of that frame, on `axis`.
     """
     normal = np.cross(axis.along, following.along)
     sine = float(np.linalg.norm(normal))

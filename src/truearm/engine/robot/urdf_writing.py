@@ -30,7 +30,7 @@ def left_out(robot: Robot, format_: str, supported: Collection[str] = ()) -> lis
 
     Args:
         format_: What the file is, as a sentence begins: ``A URDF``.
-        held: Names of the joint effects that it holds after all; with that of balancers the balancers themselves.
+        supported: Names of the joint effects that it holds after all; with that of balancers the balancers themselves.
     """
     messages = []
     for effect in robot.effects:

@@ -89,7 +89,7 @@ class Link:
 
 
 def stacked(links: Sequence[Link], indices: IntArray) -> Link:
-    """Return one link that is at each configuration the one of those links that `which` names."""
+    """Return one link that is at each configuration the one of those links that `indices` names."""
     before, after = (np.array([getattr(link, side) for link in links])[indices] for side in ("before", "after"))
     return replace(links[0], before=before, after=after, zero=np.array([link.zero for link in links])[indices])
 

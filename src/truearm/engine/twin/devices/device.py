@@ -207,7 +207,7 @@ def shown(
     Args:
         visible: Tells which targets of a robot are seen at joint positions ``(n, joints)``, ``(n, targets)``; a
             configuration that shows none of them is passed over.
-        what: Who looks, for messages.
+        device: Who looks, for messages.
 
     Returns:
         Joint positions ``(count, joints)``, and which targets are seen ``(count, targets)``.

@@ -81,7 +81,7 @@ def postures_at(
     Args:
         goals: Places in the world ``(k, 3)`` [m].
         count: How many of them are needed.
-        what: Name of what is there, for messages.
+        device: Name of what is there, for messages.
         facing: Directions ``(k, 3)`` in the world along which the flange's z shall point, give or take `within` [rad];
             any if None.
 

@@ -270,18 +270,18 @@ def test_the_first_figure_is_the_held_out_error() -> None:
 
 
 def test_the_error_to_expect_is_on_the_first_page_with_what_it_is_of() -> None:
-    found, text = made().expected, page(made()).text
-    low, high = found.overall.interval_90
-    assert f"{deserved(found.overall.mean * 1e3, (high - low) * 1e3 / 3.29)} mm" in text
+    result, text = made().expected, page(made()).text
+    low, high = result.overall.interval_90
+    assert f"{deserved(result.overall.mean * 1e3, (high - low) * 1e3 / 3.29)} mm" in text
     assert "Mean position error to expect over the whole workspace" in text
     assert "Targets 1, 2, 3 in the instrument's frame, no payload" in text
-    bound = replace(made(), expected=replace(found, omissions=("values at a bound count as exact",)))
-    said = Page(report_html(bound)).text
-    assert "The errors may be larger: values at a bound count as exact." in said
+    bound = replace(made(), expected=replace(result, omissions=("values at a bound count as exact",)))
+    message = Page(report_html(bound)).text
+    assert "The errors may be larger: values at a bound count as exact." in message
     assert ("may be larger" in text, "positions are expected below" in text) == (False, True)
-    assert "positions are expected below" not in said  # nor anywhere else an upper end
+    assert "positions are expected below" not in message  # nor anywhere else an upper end
     table = report_html(bound).partition('id="expected-targets"')[2].partition("</table>")[0]
-    assert table.count("or more") == 1 + len(found.targets)
+    assert table.count("or more") == 1 + len(result.targets)
 
 
 def test_noise_and_notices_in_sentences() -> None:
@@ -534,10 +534,10 @@ def test_a_picture_has_the_curve_its_band_and_where_was_measured() -> None:
 
 
 def test_a_wide_band_outside_the_measured_range_does_not_flatten_the_curve() -> None:
-    found = curve(np.linspace(-60, 150, 60))
+    result = curve(np.linspace(-60, 150, 60))
     amounts = np.zeros((120, 120))
     amounts[0, 0] = math.radians(1.0) ** 2  # the sine of one period: a degree, which no picture of 10 mdeg can hold
-    wide = FittedCurve(found.number, found.name, found.amounts, amounts, found.shown, np.radians([-5.0, 0.0, 5.0]))
+    wide = FittedCurve(result.number, result.name, result.amounts, amounts, result.shown, np.radians([-5.0, 0.0, 5.0]))
     bottom, top = curve_figure(wide)["layout"]["yaxis"]["range"]
     assert 100 < top - bottom < 2000  # the band has 170 mdeg to either side at 5 deg, 2000 at 90 deg
     (row,) = curves_table([curve(np.linspace(-60, 150, 60), deviation=0.1)]).rows

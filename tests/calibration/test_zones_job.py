@@ -67,9 +67,9 @@ def test_what_is_kept_is_written_and_read(cut: tuple[Path, Calibration]) -> None
     kept = [verdict.box.name for verdict in zones.kept]
     assert names == {*run.written, "truearm.manifest.json"}
     assert {f"zone-{name}.yaml" for name in kept} < names
-    found = json.loads((folder / "out" / "result.json").read_text())["zones"]
-    assert found["kept"] == kept
-    assert [zone["kept"] for zone in found["zones"]].count(True) == len(kept)
+    result = json.loads((folder / "out" / "result.json").read_text())["zones"]
+    assert result["kept"] == kept
+    assert [zone["kept"] for zone in result["zones"]].count(True) == len(kept)
     content = read_zones(folder / "out" / "zones.yaml")
     boxes, overlap = boxes_of(content, "zones.yaml")
     assert overlap == pytest.approx(0.05)
@@ -171,12 +171,12 @@ def test_zones_are_for_validate_alone(cut: tuple[Path, Calibration], tmp_path: P
 def test_the_command_takes_a_number_or_a_file(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(csv_text(campaign("irb120", 60, 0.02e-3, 7)[1]))
     words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--out", str(tmp_path / "out"), "--details"]
-    told = CliRunner().invoke(program(), [*words, "--zones", "2"])
-    assert told.exit_code == 0
-    assert "\nZones: " in told.stdout
-    assert told.stdout.splitlines()[-1].startswith(f"Written to {tmp_path / 'out'}: calibrated.yaml, result.json")
-    told = CliRunner().invoke(program(), [*words, "--zones", "2 or 3"])
-    assert told.exit_code != 0
+    outcome = CliRunner().invoke(program(), [*words, "--zones", "2"])
+    assert outcome.exit_code == 0
+    assert "\nZones: " in outcome.stdout
+    assert outcome.stdout.splitlines()[-1].startswith(f"Written to {tmp_path / 'out'}: calibrated.yaml, result.json")
+    outcome = CliRunner().invoke(program(), [*words, "--zones", "2 or 3"])
+    assert outcome.exit_code != 0
 
 
 def test_boxes_fill_the_space_and_are_nearly_cubes() -> None:

@@ -40,9 +40,9 @@ PLATE: Final = np.array([0.31, -0.11, 0.06])
 
 
 def small(motion: np.ndarray) -> np.ndarray:
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = Rotation.from_rotvec(motion[3:]).as_matrix(), motion[:3]
-    return made
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = Rotation.from_rotvec(motion[3:]).as_matrix(), motion[:3]
+    return matrix
 
 
 def links(rng: np.random.Generator) -> list[np.ndarray]:
@@ -131,19 +131,19 @@ def promise(seed: int, spread: float, *, tool: str = "drawing", frame: bool = Fa
         there = np.linalg.inv(robot.base.matrix) @ here.base @ stands
         places.frames["wobjplate"] = Placed(None, Transform.from_matrix(there[:3, :3], there[:3, 3]))
     one = RAPID.read([Source(Path("p.mod"), program(spread, np.random.default_rng(5000 + seed)))])
-    found = corrected_programs(robot, [one], places, choice=Choice(taught=frozenset())).corrections[0]
-    known = found.expected
+    result = corrected_programs(robot, [one], places, choice=Choice(taught=frozenset())).corrections[0]
+    known = result.expected
     assert known is not None
     tip = here.reflector if tool == "target" else TIP
     rows = np.isfinite(known.before)  # not those out of reach
-    tips = (flange(here.arm, found.joints[rows]) @ [*tip, 1.0])[:, :3]
-    meant = (stands @ found.before[rows])[:, :3, 3]
+    tips = (flange(here.arm, result.joints[rows]) @ [*tip, 1.0])[:, :3]
+    meant = (stands @ result.before[rows])[:, :3, 3]
     if not frame:
         tips, meant = tips - tips.mean(axis=0), meant - meant.mean(axis=0)
         tips = Rotation.align_vectors(meant, tips)[0].apply(tips)
-    interval = known.drawn.interval(found.corrected, rows)
+    interval = known.drawn.interval(result.corrected, rows)
     assert interval is not None
-    expected = np.where(found.corrected, known.after, known.before)[rows]
+    expected = np.where(result.corrected, known.after, known.before)[rows]
     return Promise(float(np.linalg.norm(tips - meant, axis=1).mean()), float(expected.mean()), interval)
 
 
@@ -195,9 +195,9 @@ def test_the_flange_is_as_uncertain_as_the_arm_is_found_to_be_inaccurate() -> No
 def test_a_target_that_was_held_stays_where_it_is_on_the_real_flange() -> None:
     robot = calibrate("irb120", campaign("irb120", 40, 2e-5, 3)[1], train="all").robot
     assert robot.proof is not None
-    one = [f"target_1_{axis}" for axis in "xyz"]
-    held = replace(robot, proof=replace(robot.proof, held=tuple(one)))
-    place, spread = np.array([robot.values[name] for name in one]), flange_spread(held)
+    axes = [f"target_1_{axis}" for axis in "xyz"]
+    held = replace(robot, proof=replace(robot.proof, held=tuple(axes)))
+    place, spread = np.array([robot.values[name] for name in axes]), flange_spread(held)
     moved = spread[:3] + np.cross(spread[3:], place[:, None], axis=0)
     np.testing.assert_allclose(moved, 0.0, atol=1e-15)
     assert np.linalg.norm(spread[3:], axis=0).max() > math.radians(0.02)

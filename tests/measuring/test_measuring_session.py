@@ -28,8 +28,8 @@ def session(targets: Iterable[str] = ("a", "b"), nests: Iterable[str] = (), ever
 def taken(of: Session, name: str, label: str | None = None, *, x: float | None = None, **more: Any) -> Entry:
     """Take a reading whose place is another one each time, and return what became of it."""
     place = np.array([0.1 + 0.01 * len(of) if x is None else x, 0.2, 0.3])
-    given = {"time": 10.0 * len(of), "samples": 20, "deviation": 1e-5, "settling": 1e-5} | more
-    entry = of.judged(Reading(name, position=place, label=label, **given))
+    options = {"time": 10.0 * len(of), "samples": 20, "deviation": 1e-5, "settling": 1e-5} | more
+    entry = of.judged(Reading(name, position=place, label=label, **options))
     of.add(entry)
     return entry
 
@@ -306,11 +306,11 @@ def test_the_deviation_is_the_instruments_or_that_of_the_nests_and_never_that_of
     while (step := of.next) is not None:
         place = 2e-5 * rng.standard_normal(3) + (1.0 if step.names[0] == "n1" else 2.0)
         of.add(of.judged(Reading(step.names[0], 1.0, place, label=step.label, deviation=1e-6)))
-    found = stated_sigma(of).value
-    assert found == pytest.approx(2e-5, rel=0.1)
+    result = stated_sigma(of).value
+    assert result == pytest.approx(2e-5, rel=0.1)
     data = kept(of)
     assert data.sigma is not None
-    assert set(data.sigma.tolist()) == {found}
+    assert set(data.sigma.tolist()) == {result}
 
 
 def test_the_drift_of_nests_is_what_they_moved() -> None:
@@ -345,9 +345,9 @@ def test_one_nest_tells_its_scatter_from_round_to_round_and_a_drift_beside_it() 
             place = 1e-5 * rng.standard_normal(3) + (1.0 if step.names[0] == "n" else 2.0)
             place[0] += drift * step.configuration / 11
             of.add(of.judged(Reading(step.names[0], 1.0, place, label=step.label)))
-        found = nest_drift(of)
-        assert found is not None
-        noise = found.noise()
+        result = nest_drift(of)
+        assert result is not None
+        noise = result.noise()
         assert noise is not None
         assert 0.7e-5 < noise < most
     few = session(nests=("n",))

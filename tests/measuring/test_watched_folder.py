@@ -80,8 +80,8 @@ def made(tmp_path: Path) -> Iterator[Callable[..., Folder]]:
 
 
 @pytest.fixture
-def watched(made: Callable[..., Folder]) -> Folder:
-    return made()
+def watched(result: Callable[..., Folder]) -> Folder:
+    return result()
 
 
 def test_rows_are_read_as_they_come_and_half_a_line_waits(watched: Folder) -> None:
@@ -139,8 +139,8 @@ def test_a_broken_row_is_named_and_the_others_are_kept(watched: Folder) -> None:
     broken = ("P2,a,oops,2,3,2026-11-23 10:00:01,0.01,20,0\n", 'P2,"a,1,2\n', "P2,a,1\n", row("P2", "a", "nan"))
     watched.write(HEADER + row("P1", "a") + "".join(broken) + row("P3", "a", 4.0))
     assert watched.step() == ["P1/a", "P3/a"]
-    said = watched.campaign.source.messages()
-    assert [f"points.csv, line {n}" in text for n, text in zip((3, 4, 5, 6), said, strict=True)] == [True] * 4
+    messages = watched.campaign.source.messages()
+    assert [f"points.csv, line {n}" in text for n, text in zip((3, 4, 5, 6), messages, strict=True)] == [True] * 4
     (notice,) = watched.campaign.source.notices
     assert notice.code == "rows-broken"
     assert "4 rows could not be read" in notice.message

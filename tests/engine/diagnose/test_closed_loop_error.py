@@ -51,12 +51,12 @@ def true_error(fit: Fit, twin: Twin) -> float:
     """Return the mean error all over the limits [m], behind the best rigid motion where nothing locates the robot."""
     q = IRB120.random_configurations(200, np.random.default_rng(99))
     frames = twin.frames(q)
-    found = np.concatenate([fit.robot.world_poses(q, t.name)[0] for t in fit.robot.targets])
+    values = np.concatenate([fit.robot.world_poses(q, t.name)[0] for t in fit.robot.targets])
     true = np.concatenate([frames[t.name][:, :3, 3] for t in fit.robot.targets])
     if fit.gauge_freedoms:
-        R, t = rigid_motion(found, true)
-        found = found @ R.T + t
-    return float(np.linalg.norm(found - true, axis=1).mean())
+        R, t = rigid_motion(values, true)
+        values = values @ R.T + t
+    return float(np.linalg.norm(values - true, axis=1).mean())
 
 
 def stated_and_true(device: str, truth: str) -> Array:

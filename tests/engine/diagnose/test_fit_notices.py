@@ -86,9 +86,9 @@ def test_pairs_tell_gain_loss_and_neither() -> None:
 def test_a_robot_that_is_accurate_already_is_no_error() -> None:
     for seed in (5, 3):
         accurate = campaign("irb120", 40, 2e-5, seed, "nominal")[1]
-        found = truearm.calibrate("irb120", accurate)
-        assert [(n.code, n.level) for n in found.warnings] == [("no-gain", "warning")], seed
-        assert (found.finished, found.faults) == (True, ("no-gain",)), seed
+        result = truearm.calibrate("irb120", accurate)
+        assert [(n.code, n.level) for n in result.warnings] == [("no-gain", "warning")], seed
+        assert (result.finished, result.faults) == (True, ("no-gain",)), seed
         assert truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, seed)[1]).faults == (), seed
     # without a held-out part or another robot nothing is compared
     codes = {notice.code for notice in truearm.calibrate("irb120", accurate, train="all").warnings}
@@ -184,19 +184,19 @@ def fitted(data: Dataset, loss: Loss = "linear") -> Fit:
 def test_a_fit_that_leaves_nothing_is_not_taken_for_one_without_noise(seed: int) -> None:
     """33 numbers for 41 parameters: the expected error was a ten thousandth of the true one, and the advice to stop."""
     twin = campaign("ur5e", 16, FINE, seed)[0]
-    found = calibrate("ur5e", in_turn(16, seed, declared=False), seed=seed)
+    result = calibrate("ur5e", in_turn(16, seed, declared=False), seed=seed)
     q = load_robot("ur5e").random_configurations(100, np.random.default_rng(1))
-    apart = [found.robot.world_poses(q, name)[0] - twin.robot.world_poses(q, name)[0] for name in ("1", "2", "3")]
+    apart = [result.robot.world_poses(q, name)[0] - twin.robot.world_poses(q, name)[0] for name in ("1", "2", "3")]
     true = float(np.linalg.norm(apart, axis=2).mean())
-    assert found.expected.overall.interval_90[1] > true
-    assert found.expected.overall.mean > 0.1e-3
-    (notice,) = [n for n in found.warnings if n.code == FEW_READINGS.code]
+    assert result.expected.overall.interval_90[1] > true
+    assert result.expected.overall.mean > 0.1e-3
+    (notice,) = [n for n in result.warnings if n.code == FEW_READINGS.code]
     assert notice.level == "warning"
     assert "The training readings are 33 numbers. The 41 parameters take up 3" in notice.message
     assert "no deviation is declared: it is assumed, 0.1 mm (position)" in notice.message
-    assert found.next[0].code == "measure-more"
-    assert "read more targets" in found.next[0].message
-    assert not {"stop", "unexplained"} & {step.code for step in found.next}
+    assert result.next[0].code == "measure-more"
+    assert "read more targets" in result.next[0].message
+    assert not {"stop", "unexplained"} & {step.code for step in result.next}
 
 
 def test_declared_deviations_are_never_made_smaller_by_what_is_left() -> None:
@@ -249,11 +249,11 @@ def test_readings_enough_are_no_notice() -> None:
 
 
 def test_a_check_counts_the_numbers_and_says_to_measure_more() -> None:
-    found = check("ur5e", in_turn(16, 0, declared=False))
-    (notice,) = found.warnings[-1:]
+    result = check("ur5e", in_turn(16, 0, declared=False))
+    (notice,) = result.warnings[-1:]
     assert notice.code == FEW_READINGS.code
     assert "48 numbers, for 41 parameters of the geometric model" in notice.message
-    codes = [step.code for step in found.next]
+    codes = [step.code for step in result.next]
     assert (codes[-1], "calibrate" in codes) == ("measure-more", False)
 
 
@@ -262,8 +262,8 @@ def test_errors_that_the_fit_has_eaten_do_not_make_data_narrow() -> None:
     whole = replace(campaign("irb120", 13, FINE, 3)[1], sigma=None)
     one = replace(whole, position=np.where((whole.target == 0)[:, None], whole.position, np.nan))
     for poses, few in ((11, True), (13, False)):
-        found = calibrate("irb120", one.of_configurations(np.arange(poses)), train="all")
-        codes = [notice.code for notice in found.warnings]
+        result = calibrate("irb120", one.of_configurations(np.arange(poses)), train="all")
+        codes = [notice.code for notice in result.warnings]
         assert (FEW_READINGS.code in codes) is few
         assert "narrow-data" not in codes
 
@@ -318,9 +318,9 @@ def test_a_jumped_joint_zero_is_named() -> None:
         joints[FIRST_MOVED:, joint - 1] += np.radians(0.2)
         (notice,) = told(replace(data, joints=joints))
         assert (notice.code, notice.level) == ("joint-zero-jumped", "error")
-        found = known(re.search(r"From configuration (\d+) on, joint (\d) stands ([0-9.]+) deg off", notice.message))
-        assert (int(found[1]), int(found[2])) == (FIRST_MOVED + 1, joint)
-        assert 0.18 < float(found[3]) < 0.22
+        match = known(re.search(r"From configuration (\d+) on, joint (\d) stands ([0-9.]+) deg off", notice.message))
+        assert (int(match[1]), int(match[2])) == (FIRST_MOVED + 1, joint)
+        assert 0.18 < float(match[3]) < 0.22
 
 
 def test_a_drift_is_told() -> None:

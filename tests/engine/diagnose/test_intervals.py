@@ -161,13 +161,13 @@ def test_postures_visited_again_tell_the_repeatability() -> None:
     robot = true_robot(rng)
     q = np.repeat(robot.random_configurations(8, rng), 30, axis=0)
     data = Dataset.of(q, read(robot, q, 0.01, rng), targets=[*TARGETS], sigma=SIGMA)
-    found = repeatability(data, SIGMA)
-    assert found is not None
-    assert (found.postures, found.visits) == (8, 240)
+    estimate = repeatability(data, SIGMA)
+    assert estimate is not None
+    assert (estimate.postures, estimate.visits) == (8, 240)
     exact = np.array([robot.world_poses(q, name)[0] for name in TARGETS])
     off = np.radians(0.01) * np.random.default_rng(0).standard_normal(q.shape)
     lengths = np.linalg.norm(np.array([robot.world_poses(q + off, name)[0] for name in TARGETS]) - exact, axis=2)
-    assert found.rp == pytest.approx(lengths.mean() + 3 * lengths.std(), rel=0.15)
+    assert estimate.rp == pytest.approx(lengths.mean() + 3 * lengths.std(), rel=0.15)
 
 
 def test_visits_of_one_configuration_tell_it_too_and_single_ones_do_not() -> None:
@@ -183,7 +183,7 @@ def test_visits_of_one_configuration_tell_it_too_and_single_ones_do_not() -> Non
         position=np.concatenate([once.position, read(robot, q, 0.01, rng).reshape(-1, 3)]),
         visit=np.repeat([1, 2], len(once.target)),
     )
-    found = repeatability(twice, SIGMA)
-    assert found is not None
-    assert (found.postures, found.visits) == (30, 60)
-    assert found.rp == pytest.approx(0.3e-3, rel=0.3)
+    estimate = repeatability(twice, SIGMA)
+    assert estimate is not None
+    assert (estimate.postures, estimate.visits) == (30, 60)
+    assert estimate.rp == pytest.approx(0.3e-3, rel=0.3)

@@ -167,9 +167,9 @@ def test_a_wrong_sign_of_one_joint_is_named_and_no_other_joint(of_one: bool) -> 
         (notice,) = run.warnings
         assert notice.code == "joints-mistaken"
         assert f"{index + 1} (joint {joint}) fit with the opposite sign of this joint" in notice.message
-        said = said_next(run)
-        assert f"the sign of joint {joint} of configuration {index + 1} looks wrong" in said
-        assert "looks off" not in said
+        message = said_next(run)
+        assert f"the sign of joint {joint} of configuration {index + 1} looks wrong" in message
+        assert "looks off" not in message
 
 
 def said_next(run: DataCheck) -> str:
@@ -177,15 +177,15 @@ def said_next(run: DataCheck) -> str:
 
 
 def test_a_joint_or_slide_that_is_off_by_far_is_named_with_how_far(tmp_path: Path) -> None:
-    said = said_next(check("irb120", slipped(elastic(), [(17, 3, 40.0)])))
-    assert "joint 3 of configuration 18 looks off by about 40 deg" in said
+    message = said_next(check("irb120", slipped(elastic(), [(17, 3, 40.0)])))
+    assert "joint 3 of configuration 18 looks off by about 40 deg" in message
     (tmp_path / "track.yaml").write_text(ON_A_TRACK, encoding="utf-8")
     robot, rng = load_robot(tmp_path / "track.yaml"), np.random.default_rng(3)
     data = measure(truth_twin(robot, "random", rng), robot.random_configurations(40, rng), NOISE, rng)
     joints = data.joints.copy()
     joints[20, 0] += 0.05
-    said = said_next(check(robot, replace(data, joints=joints)))
-    assert "joint 1 of configuration 21 looks off by about 50 mm" in said
+    message = said_next(check(robot, replace(data, joints=joints)))
+    assert "joint 1 of configuration 21 looks off by about 50 mm" in message
 
 
 def test_no_joint_is_named_where_two_explain_the_readings_or_none_does() -> None:
@@ -193,12 +193,12 @@ def test_no_joint_is_named_where_two_explain_the_readings_or_none_does() -> None
     joints = data.joints.copy()
     joints[21, 4] = 0.0  # joints 4 and 6 turn about one axis
     straight = measure(twin, joints, 0.3e-3, np.random.default_rng(3))
-    said = said_next(check("irb120", slipped(straight, [(21, 4, 10.0)])))
-    assert "configuration 22 is off by" in said
-    assert "joint 4" not in said
-    said = said_next(check("irb120", slipped(data, [(10, 2, 15.0), (10, 5, -30.0)])))
-    assert "configuration 11 is off by" in said
-    assert "of configuration 11 looks off" not in said
+    message = said_next(check("irb120", slipped(straight, [(21, 4, 10.0)])))
+    assert "configuration 22 is off by" in message
+    assert "joint 4" not in message
+    message = said_next(check("irb120", slipped(data, [(10, 2, 15.0), (10, 5, -30.0)])))
+    assert "configuration 11 is off by" in message
+    assert "of configuration 11 looks off" not in message
 
 
 def test_several_rows_are_found_behind_each_other_and_behind_the_wrong_model() -> None:
@@ -284,9 +284,9 @@ def test_what_is_left_out_is_left_out_of_everything() -> None:
     off = off_configurations(left)
     assert 17 in off.indices
     assert off.left < 0.9
-    rest = left.without(off.indices)
-    assert rest.problem.data.configurations == data.configurations - len(off.indices)
-    assert rest.freedom == len(rest.residual) - rest.basis.shape[1]
+    remaining = left.without(off.indices)
+    assert remaining.problem.data.configurations == data.configurations - len(off.indices)
+    assert remaining.freedom == len(remaining.residual) - remaining.basis.shape[1]
     assert known(explanation(left, off.indices)).cause == "compliance"
     assert left.without(()) is left
 
@@ -312,9 +312,9 @@ def test_too_few_readings_are_told_from_a_choice_that_tried_everything_and_from_
     tried = replace(fit, model=replace(fit.model, name="auto", tried=("backlash",)))
     assert "cross-validation found no other joint effect" in _end(LeftOver.of(tried, data)).message
     monkeypatch.setattr("truearm.engine.diagnose.next_steps.has_curves", lambda _: True)
-    said = _end(LeftOver.of(fit, data)).message
-    assert "The curves leave too few equations" in said
-    assert "too few readings" not in said
+    message = _end(LeftOver.of(fit, data)).message
+    assert "The curves leave too few equations" in message
+    assert "too few readings" not in message
 
 
 def test_what_is_not_known_of_curves_is_said() -> None:

@@ -44,9 +44,9 @@ def test_hardly_any_choice_tells_more() -> None:
             chosen = most_informative(rows, 4, known, OfInterest(interest))
             every = np.array([told(rows, list(c), known, interest) for c in combinations(range(12), 4)])
             assert len(set(chosen)) == 4
-            found = told(rows, chosen, known, interest)
-            assert found > every.max() - 0.1, (interest, seed)
-            assert np.mean(every > found) < 0.02, (interest, seed)
+            result = told(rows, chosen, known, interest)
+            assert result > every.max() - 0.1, (interest, seed)
+            assert np.mean(every > result) < 0.02, (interest, seed)
 
 
 @pytest.mark.parametrize("name", INDICES)
@@ -58,9 +58,9 @@ def test_every_index_comes_near_to_the_best_choice(name: str) -> None:
         every = np.array([value(known + total_of(rows, c)) for c in combinations(range(12), 5)])
         chosen = most_informative(rows, 5, known, INDICES[name])
         assert len(set(chosen)) == 5
-        found = value(known + total_of(rows, chosen))
+        result = value(known + total_of(rows, chosen))
         # The condition number is neither concave nor smooth: exchanges of one get stuck sooner.
-        assert np.mean(every > found + 1e-12) < (0.2 if name == "O2" else 0.02), seed
+        assert np.mean(every > result + 1e-12) < (0.2 if name == "O2" else 0.02), seed
 
 
 def test_with_all_pairs_exchanged_the_choice_is_often_the_best() -> None:
@@ -68,8 +68,8 @@ def test_with_all_pairs_exchanged_the_choice_is_often_the_best() -> None:
         rng = np.random.default_rng(seed)
         rows, known = rng.normal(size=(9, 3, 3)), 1e-6 * np.eye(3)
         every = [float(O1().value(known + total_of(rows, c))) for c in combinations(range(9), 3)]
-        found = float(O1().value(known + total_of(rows, most_informative(rows, 3, known, O1()))))
-        assert found == pytest.approx(max(every), abs=1e-9) or sum(v > found for v in every) <= 2, seed
+        result = float(O1().value(known + total_of(rows, most_informative(rows, 3, known, O1()))))
+        assert result == pytest.approx(max(every), abs=1e-9) or sum(v > result for v in every) <= 2, seed
 
 
 @pytest.mark.parametrize("name", INDICES)
@@ -83,8 +83,8 @@ def test_no_single_exchange_and_no_random_choice_is_better(name: str) -> None:
     assert best > max(by_chance)
     if name == "O1":  # of the others, some exchange outside the promising ones may gain a little
         for place in range(10):
-            rest = chosen[:place] + chosen[place + 1 :]
-            others = [value(known + total_of(rows, [*rest, new])) for new in range(120) if new not in rest]
+            remaining = chosen[:place] + chosen[place + 1 :]
+            others = [value(known + total_of(rows, [*remaining, new])) for new in range(120) if new not in remaining]
             assert max(others) <= best + 1e-9
 
 
@@ -152,8 +152,8 @@ def test_an_orthogonal_jacobian_in_closed_form() -> None:
     rng = np.random.default_rng(0)
     Q = np.linalg.qr(rng.normal(size=(12, 3)))[0]
     J = Q * [1.0, 2.0, 4.0] @ np.linalg.qr(rng.normal(size=(3, 3)))[0]  # singular values 4, 2, 1
-    found = observability(J.T @ J, 4)
-    assert found == pytest.approx({"O1": 2.0 / 2.0, "O2": 0.25, "O3": 1.0, "O4": 0.25, "O5": 4.0 / 7.0})
+    result = observability(J.T @ J, 4)
+    assert result == pytest.approx({"O1": 2.0 / 2.0, "O2": 0.25, "O3": 1.0, "O4": 0.25, "O5": 4.0 / 7.0})
     blind = observability(np.diag([1.0, 0.0]), 1)
     assert max(blind["O3"], blind["O5"]) < 1e-100
 

@@ -128,9 +128,9 @@ def test_the_order_of_readings_does_not_matter() -> None:
     twin, data = campaign("ur5", 25, 0.05e-3, 6)
     shuffled = data.of_configurations(np.random.default_rng(1).permutation(25))
     q = twin.robot.random_configurations(20, np.random.default_rng(2))
-    one, other = (identify(load_robot("ur5"), d, GEOMETRIC).robot for d in (data, shuffled))
-    for target in one.targets:
-        before, after = (robot.world_poses(q, target.name)[0] for robot in (one, other))
+    first, other = (identify(load_robot("ur5"), d, GEOMETRIC).robot for d in (data, shuffled))
+    for target in first.targets:
+        before, after = (robot.world_poses(q, target.name)[0] for robot in (first, other))
         np.testing.assert_allclose(before, after, atol=1e-10, rtol=0)
 
 
@@ -288,10 +288,10 @@ def test_joints_that_never_moved_are_a_loss_of_rank(still: list[int]) -> None:
     twin, data = campaign("irb120", 40, 0.05e-3, 2)
     data = standing_still(twin, data, still)
     for redundancy in get_args(Redundant):
-        held = (
+        fixed = (
             FixedPlaces(twin.robot.base) if redundancy == "none" else NOTHING_FIXED
         )  # it needs something that is known
-        fit = identify(load_robot("irb120"), data, GEOMETRIC, redundancy=redundancy, fixed=held)
+        fit = identify(load_robot("irb120"), data, GEOMETRIC, redundancy=redundancy, fixed=fixed)
         assert fit.status is Status.RANK_LOSS, redundancy
         assert fit.unobservable
         assert all(fit.parameter_status(name) == "not-determined" for name in fit.unobservable)

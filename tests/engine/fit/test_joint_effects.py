@@ -49,10 +49,10 @@ def told(fit: Fit) -> dict[str, str]:
 def test_compliance_is_that_of_the_twin_and_the_vertical_axis_is_named() -> None:
     fit = identify(IRB120, bent(50), MODEL["elastic"])
     for number, true in COMPLIANCE.items():
-        found = fit.robot.parameters[f"compliance_{number}"]
-        assert found.deviation is not None
-        assert found.deviation < 0.2 * true
-        assert abs(found.value - true) < 4 * found.deviation
+        parameter = fit.robot.parameters[f"compliance_{number}"]
+        assert parameter.deviation is not None
+        assert parameter.deviation < 0.2 * true
+        assert abs(parameter.value - true) < 4 * parameter.deviation
     notices = told(fit)
     assert notices["effects-uninformed"].startswith("The data say nothing about compliance_1. Either nothing loads")
     assert not {"no-loads", "negative-effect", "too-many-effects"} & set(notices)

@@ -54,9 +54,9 @@ def place_of(robot: Robot, target: str) -> Array:
 def test_readings_of_the_nominal_robot_give_its_own_places_and_name_what_is_taken_on_trust(device: str) -> None:
     twin, data = read_by(device)
     start = start_from_readings(NOMINAL, data)
-    found, true = (np.array([place_of(robot, name) for name in data.targets]) for robot in (start, twin.robot))
+    values, true = (np.array([place_of(robot, name) for name in data.targets]) for robot in (start, twin.robot))
     # the search for a touching tip keeps to 1 m a little, and more where lines are nearly flat about their middles
-    np.testing.assert_allclose(found, true, atol=1e-4 if device == "drawn-circle" else 1e-6)
+    np.testing.assert_allclose(values, true, atol=1e-4 if device == "drawn-circle" else 1e-6)
     if data.anchored:
         np.testing.assert_allclose(start.base.translation, twin.robot.base.translation, atol=1e-9)
         np.testing.assert_allclose(start.base.rotation, twin.robot.base.rotation, atol=1e-9)
@@ -114,31 +114,31 @@ def test_four_strings_that_are_not_in_a_plane() -> None:
     np.testing.assert_allclose(start.base.translation, twin.robot.base.translation, atol=1e-9)
 
 
-def joined(one: Dataset, other: Dataset) -> Dataset:
+def joined(first: Dataset, other: Dataset) -> Dataset:
     """Return the readings of two campaigns with one robot as one dataset without deviations."""
 
     def both(name: str, *width: int) -> Array | None:
-        parts = [getattr(d, name) for d in (one, other)]
+        parts = [getattr(d, name) for d in (first, other)]
         if parts[0] is None and parts[1] is None:
             return None
-        empty = [np.full((len(d.target), *width), np.nan) for d in (one, other)]
+        empty = [np.full((len(d.target), *width), np.nan) for d in (first, other)]
         return np.concatenate([e if p is None else p for p, e in zip(parts, empty, strict=True)])
 
-    n = one.configurations
-    against = [one.against, np.where(other.against < 0, -1, other.against + len(one.fixtures))]
+    n = first.configurations
+    against = [first.against, np.where(other.against < 0, -1, other.against + len(first.fixtures))]
     return Dataset(
         source="both",
         labels=tuple(map(str, range(n + other.configurations))),
-        joints=np.concatenate([one.joints, other.joints]),
-        joint_kinds=one.joint_kinds,
-        targets=(*one.targets, *other.targets),
-        configuration=np.concatenate([one.configuration, other.configuration + n]),
-        target=np.concatenate([one.target, other.target + len(one.targets)]),
-        position=np.concatenate([one.position, other.position]),
+        joints=np.concatenate([first.joints, other.joints]),
+        joint_kinds=first.joint_kinds,
+        targets=(*first.targets, *other.targets),
+        configuration=np.concatenate([first.configuration, other.configuration + n]),
+        target=np.concatenate([first.target, other.target + len(first.targets)]),
+        position=np.concatenate([first.position, other.position]),
         quaternion=both("quaternion", 4),
         distance=both("distance"),
         height=both("height"),
-        fixtures=(*one.fixtures, *other.fixtures),
+        fixtures=(*first.fixtures, *other.fixtures),
         fixture=np.concatenate(against),
         setup=other.setup,
     )
@@ -173,8 +173,8 @@ def test_missing_readings_do_no_harm() -> None:
         lengths = getattr(data, field).copy()
         lengths[[3, 11]] = np.nan
         start = start_from_readings(NOMINAL, replace(data, **{field: lengths}))
-        found, true = (place_of(robot, data.targets[0]) for robot in (start, twin.robot))
-        np.testing.assert_allclose(found, true, atol=1e-6, err_msg=device)
+        result, true = (place_of(robot, data.targets[0]) for robot in (start, twin.robot))
+        np.testing.assert_allclose(result, true, atol=1e-6, err_msg=device)
 
 
 def test_a_target_that_two_strings_hold_is_found_around_one_that_four_do() -> None:

@@ -11,12 +11,12 @@ from truearm.engine.base.errors import InputError
 @contextmanager
 def refused(*parts: str, parameter: str | None = None, of: object = "") -> Iterator[None]:
     """Expect a refusal that says these parts; `of` tells which of several cases failed."""
-    said: InputError | None = None
+    words: InputError | None = None
     try:
         yield
     except InputError as refusal:
-        said = refusal
-    assert said is not None, f"{of}: it is not refused"
-    missing = [part for part in parts if part not in str(said)]
-    assert not missing, f"{of}: '{said}' does not say {missing}"
-    assert parameter in (None, said.parameter), f"{of}: '{said}' is about {said.parameter}"
+        words = refusal
+    assert words is not None, f"{of}: it is not refused"
+    missing = [part for part in parts if part not in str(words)]
+    assert not missing, f"{of}: '{words}' does not say {missing}"
+    assert parameter in (None, words.parameter), f"{of}: '{words}' is about {words.parameter}"

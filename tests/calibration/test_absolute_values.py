@@ -87,9 +87,9 @@ def test_linear_programs_agree_with_reweighting_where_priors_are_wide() -> None:
     _, data = rolled()
     free = FreeParameters(tuple(replace(p, prior=1e3 * p.prior) for p in (arm().parameters[n] for n in ("a_2", "a_3"))))
     problem = Problem(arm(), data, free, {"position": CAMERA})
-    here, converged, _ = least_absolute(replace(problem, priors=False))
+    solved, converged, _ = least_absolute(replace(problem, priors=False))
     assert converged
-    np.testing.assert_allclose(solve(problem, "l1-components").vector, here.vector, atol=2e-6)
+    np.testing.assert_allclose(solve(problem, "l1-components").vector, solved.vector, atol=2e-6)
 
 
 # -- without priors, nothing dropped ------------------------------------------------------------------------------
@@ -181,7 +181,7 @@ def test_numbers_of_fits_that_say_nothing_are_refused() -> None:
 def test_readings_that_are_met_exactly_do_not_pass_for_perfect() -> None:
     """As many distances as parameters: nearly all residuals are zero, and say nothing of the noise."""
     data = simulate("irb120", truth="random", device="sphere", poses=28, seed=3).data
-    how: Any
-    for how in LOSSES:
-        other_fit = identify(load_robot("irb120"), replace(data, sigma=None), GEOMETRIC, loss=how)
-        assert expected_error(other_fit).overall.mean > 0.1e-3, how
+    options: Any
+    for options in LOSSES:
+        other_fit = identify(load_robot("irb120"), replace(data, sigma=None), GEOMETRIC, loss=options)
+        assert expected_error(other_fit).overall.mean > 0.1e-3, options

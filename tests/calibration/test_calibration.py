@@ -111,8 +111,8 @@ def test_the_error_to_expect_stands_beside_the_held_out_one() -> None:
     bound = replace(run(28), expected=replace(run(28).expected, omissions=("values at a bound count as exact",)))
     assert "  may be larger: values at a bound count as exact" in bound.lines()
     (line,) = (line for line in bound.lines() if line.startswith(begin[:-3]))
-    for words, there in ((" mm (90 %: ", True), (" or more), 95 % ", True), ("95 % below", False)):
-        assert (words in line) is there, words
+    for words, is_shown in ((" mm (90 %: ", True), (" or more), 95 % ", True), ("95 % below", False)):
+        assert (words in line) is is_shown, words
     assert bound.summary()["expected_mm"]["interval_90"][1] is None
     assert bound.summary()["expected_mm"]["lower_bound"] is True
 
@@ -145,8 +145,8 @@ def csv(tmp_path: Path) -> Path:
 
 def test_what_is_left_out_changes_nothing(csv: Path, tmp_path: Path) -> None:
     out = package.calibrate("irb120", csv, model="offsets", without=["3", "7"])
-    kept = [i for i, label in enumerate(DATA.labels) if label not in ("3", "7")]
-    alone = package.calibrate("irb120", DATA.of_configurations(kept), model="offsets")
+    rows = [i for i, label in enumerate(DATA.labels) if label not in ("3", "7")]
+    alone = package.calibrate("irb120", DATA.of_configurations(rows), model="offsets")
     for name, value in alone.fit.robot.values.items():
         assert out.fit.robot.values[name] == pytest.approx(value, abs=1e-7)
     assert out.summary()["without"] == ["3", "7"]
@@ -186,7 +186,7 @@ def test_what_cannot_be_left_out_or_noted_is_refused() -> None:
     words = "there is no configuration of this name.*Did you mean 24"
     refused("without", words, calibrate, without=["241"])
     refused(None, "no configuration would be left", calibrate, without=DATA.labels)
-    for notes, what in (
+    for notes, fault in (
         ({"serial": ""}, "a name and a text of one line"),
         ({"serial": "1\n2"}, "a name and a text of one line"),
         ({"serial": "1" * 201}, "a name and a text of one line"),
@@ -194,4 +194,4 @@ def test_what_cannot_be_left_out_or_noted_is_refused() -> None:
         (["serial=1"], "notes by name belong here"),
         ({str(i): "1" for i in range(21)}, "too many notes"),
     ):
-        refused("notes", what, calibrate, notes=notes)
+        refused("notes", fault, calibrate, notes=notes)

@@ -78,7 +78,7 @@ def test_excluded_readings_count_as_missing_and_the_split_stays(csv: Path, tmp_p
 def test_who_excludes_from_the_held_out_part_is_told_what_it_is_worth_with_them(csv: Path, tmp_path: Path) -> None:
     file = _file(tmp_path, (HELD_OUT[0], "2", "looks wrong"))
     result = calibrate("irb120", csv, model="offsets", exclude=file)
-    (notice,) = [one for one in result.warnings if one.code == "held-out-excluded"]
+    (notice,) = [warning for warning in result.warnings if warning.code == "held-out-excluded"]
     assert notice.level == "warning"
     assert "1 reading of the held-out part is excluded: looks wrong (1)." in notice.message
     whole = calibrate("irb120", csv, model="offsets")
@@ -88,7 +88,7 @@ def test_who_excludes_from_the_held_out_part_is_told_what_it_is_worth_with_them(
     assert f"{with_it.max * 1e3:.3f} mm at most; without it {without.mean * 1e3:.3f}" in notice.message
     only_training = _file(tmp_path, (TRAINING[0], "2", "beam broken"))
     fit = calibrate("irb120", csv, model="offsets", exclude=only_training)
-    assert "held-out-excluded" not in [one.code for one in fit.warnings]
+    assert "held-out-excluded" not in [warning.code for warning in fit.warnings]
     # what stands in a configuration that is left out belongs to no part
     file = _file(tmp_path, ("3", "2", "beam broken"))
     result = calibrate("irb120", csv, model="offsets", exclude=file, without=["3"])
@@ -172,7 +172,7 @@ def test_what_was_read_is_compared_whatever_was_measured() -> None:
 
 def test_files_that_exclude_nothing_that_was_read_are_refused(csv: Path, tmp_path: Path) -> None:
     path = tmp_path / "excluded.csv"
-    for text, what in (
+    for text, fault in (
         ("configuration,target,reason,read\n1,1,x,1 2 3\n", "line 1, read: no unit is given"),
         ("configuration,target,reason,read [deg]\n1,1,x,1 2 3\n", "line 1, read: this unit does not fit here"),
         ("configuration,target,reason,read [mm]\n1,1,x,1 2 three\n", "line 2, column read .mm.: numbers with blanks"),
@@ -188,4 +188,4 @@ def test_files_that_exclude_nothing_that_was_read_are_refused(csv: Path, tmp_pat
         ("configuration,target,reason,visit\n1,1,x,2\n", "line 2: nothing was read there"),
     ):
         path.write_text(text)
-        refused("exclude", rf"excluded\.csv, {what}", check, "irb120", csv, exclude=path)
+        refused("exclude", rf"excluded\.csv, {fault}", check, "irb120", csv, exclude=path)

@@ -114,15 +114,15 @@ def test_auto_tells_how_it_chose(truearm: Truearm, data: Path, tmp_path: Path) -
     figures, rows = ("geometric_mm", "elastic_mm", "error_mm"), ("candidates", "confirmations", "lines", "passed_over")
     assert list(way) == [*figures, "layout", "blocks", *rows]
     assert list(way["candidates"][0]) == ["effect", "taken", "gain_mm", "standard_error_mm", "reason"]
-    assert {one["effect"] for one in way["candidates"] if one["taken"]} == set(chosen["effects"])
-    assert all(bool(one["reason"]) is not one["taken"] for one in way["candidates"])
+    assert {candidate["effect"] for candidate in way["candidates"] if candidate["taken"]} == set(chosen["effects"])
+    assert all(bool(candidate["reason"]) is not candidate["taken"] for candidate in way["candidates"])
     assert (way["layout"], way["blocks"]) == ("scattered", 0)
     assert 0.01 < way["error_mm"] <= way["elastic_mm"] < 0.1 < way["geometric_mm"]
     assert outcome["command"].endswith(f"data.csv --model auto --payload {PAYLOAD} --out DIR")
     report = (tmp_path / "report.html").read_text()
-    for one in way["candidates"]:
-        gain = "–" if one["gain_mm"] is None else f"{one['gain_mm']:+.4f}"
-        assert f'<td>{one["effect"]}</td><td class="n">{gain}</td>' in report
+    for tried in way["candidates"]:
+        gain = "–" if tried["gain_mm"] is None else f"{tried['gain_mm']:+.4f}"
+        assert f'<td>{tried["effect"]}</td><td class="n">{gain}</td>' in report
     payload = "Payload</dt><dd>2.7 kg at (50, 25, 100) mm"
     for words in ("How the model was chosen", 'id="candidates"', payload):
         assert words in report
@@ -227,7 +227,7 @@ def test_what_a_model_needs_of_the_data_is_said(truearm: Truearm, data: Path, tm
     header, *rows = (line.split(",", 1) for line in data.read_text().splitlines())
     named, out = tmp_path / "named.csv", ("--out", tmp_path / "out")
     for labels in ("P{}", "{}.5", "-{}"):
-        named.write_text("\n".join([",".join(header), *(f"{labels.format(n)},{rest}" for n, rest in rows)]) + "\n")
+        named.write_text("\n".join([",".join(header), *(f"{labels.format(n)},{cells}" for n, cells in rows)]) + "\n")
         message = refused(truearm, "calibrate", "irb120", named, "--model", "full", *out)
         assert "the effect approach needs the order in which the configurations were measured" in message
         assert "got 'configurations that are not numbered'. Number the configurations 1, 2, 3" in message
@@ -331,8 +331,8 @@ def test_strength_is_held_where_all_readings_carry_one_load(tmp_path_factory: py
     assert next(n.level for n in outcome.warnings if n.code == "balancer-held") == "note"
     assert "+ balancer" not in outcome.robot.history[-1]
     known = arm.with_effects(["balancer"]).with_values({"balancer_1": STRENGTH})
-    kept = truearm.calibrate(known, data, model="elastic", effects=["balancer"])
-    assert kept.robot.values["balancer_1"] == STRENGTH
+    fixed = truearm.calibrate(known, data, model="elastic", effects=["balancer"])
+    assert fixed.robot.values["balancer_1"] == STRENGTH
 
 
 def test_balancer_of_a_robot_that_has_none_is_refused() -> None:

@@ -37,7 +37,11 @@ def worn(effects: tuple[str, ...] = ()) -> Robot:
 def corrected_lines(result: truearm.ProgramCorrection) -> list[str]:
     """Return the names of the targets that were corrected."""
     (correction,) = result.result.corrections
-    return [t.name for t, done in zip(correction.program.targets, correction.corrected.tolist(), strict=True) if done]
+    return [
+        t.name
+        for t, is_corrected in zip(correction.program.targets, correction.corrected.tolist(), strict=True)
+        if is_corrected
+    ]
 
 
 def test_home_stays_unless_it_is_asked_for(tmp_path: Path) -> None:
@@ -145,9 +149,9 @@ def test_the_arm_bends_by_what_the_program_says_that_its_tool_weighs(tmp_path: P
     program = plate(tmp_path)
     result = compensate(robot, [program], taught=["none"])
     assert result.result.loads == {"tProbe": Payload(2.7, (0.05, 0.025, 0.1))}
-    given = compensate(robot, [program], taught=["none"], payload="2.7kg,50mm,25mm,100mm")
-    assert given.files[0].text == result.files[0].text
-    assert given.result.loads == {}
+    stated = compensate(robot, [program], taught=["none"], payload="2.7kg,50mm,25mm,100mm")
+    assert stated.files[0].text == result.files[0].text
+    assert stated.result.loads == {}
     other = compensate(robot, [program], taught=["none"], payload="1kg,0mm,0mm,50mm")
     assert other.files[0].text != result.files[0].text
     dummy = plate(tmp_path, ("[2.7,[50,25,100]", "[0.001,[0,0,0.001]"))
@@ -180,9 +184,9 @@ def test_a_load_unlike_that_of_the_calibration_is_warned_of(tmp_path: Path) -> N
     assert notice.level == "warning"
     assert "In its calibration the robot carried 0 kg." in notice.message
     robot = bare.with_payload(Payload(2.7, (0.05, 0.025, 0.1)))
-    told = codes(compensate(robot, [program]))
-    assert told["loads-taken"] == "note"
-    assert "load-changes" not in told
+    warnings = codes(compensate(robot, [program]))
+    assert warnings["loads-taken"] == "note"
+    assert "load-changes" not in warnings
     for line in ("GripLoad lPart;", "tProbe.tload.mass:=6;", "MoveL pHole1,v10,z1,tProbe\\TLoad:=lPart;"):
         changing = plate(tmp_path, ("PROC main()", f"PROC main()\n    {line}"))
         assert "load-changes" in codes(compensate(robot, [changing], accept=["skipped"])), line
@@ -191,9 +195,9 @@ def test_a_load_unlike_that_of_the_calibration_is_warned_of(tmp_path: Path) -> N
 
 
 def test_a_tool_elsewhere_than_the_program_has_it_is_named(tmp_path: Path) -> None:
-    for x, told in (("9", True), ("1", False)):
+    for x, is_named in (("9", True), ("1", False)):
         tools = cell(tmp_path, f"tools:\n  tProbe: {{of: flange, translation: [{x}, 0, 125]}}\n")
-        assert ("tool-apart" in codes(compensate(worn(), [plate(tmp_path)], tools=tools))) == told
+        assert ("tool-apart" in codes(compensate(worn(), [plate(tmp_path)], tools=tools))) == is_named
 
 
 def test_frames_and_tools_of_targets_that_stay_need_no_place(tmp_path: Path) -> None:
@@ -302,4 +306,7 @@ def test_a_position_of_fanuc_is_named_with_or_without_its_comment() -> None:
     )
     target = FANUC_LS.read([Source(Path("a.ls"), f"{text}/END\n")])
     for name in ("P[2]", "P[2:seam]", "P[2*"):
-        assert [Patterns([target], [name], "keep").fit(one.name) for one in target.targets] == [False, True], name
+        assert [Patterns([target], [name], "keep").fit(position.name) for position in target.targets] == [
+            False,
+            True,
+        ], name

@@ -51,15 +51,15 @@ def run(truearm: Truearm, place: Path, *words: object, program: str = "plate.mod
     return outcome.code, outcome.out + outcome.err
 
 
-def told(truearm: Truearm, place: Path, *words: object, out: str = "out") -> dict[str, Any]:
-    code, said = run(truearm, place, "--json", *words, out=out)
-    assert code == 0, said
-    content: dict[str, Any] = json.loads(said)
+def result_of(truearm: Truearm, place: Path, *words: object, out: str = "out") -> dict[str, Any]:
+    code, output = run(truearm, place, "--json", *words, out=out)
+    assert code == 0, output
+    content: dict[str, Any] = json.loads(output)
     return content
 
 
 def test_the_contract(truearm: Truearm, place: Path) -> None:
-    result = told(truearm, place)
+    result = result_of(truearm, place)
     assert set(result) == {"programs", "expected_is_lower_bound", "expected_is_relative", "warnings"}
     (program,) = result["programs"]
     keys = {"file", "language", "targets", "corrected", "kept", "skipped", "shift_mm", "expected_mm", "not_better"}
@@ -80,7 +80,7 @@ def test_with_tool_and_frame_nothing_is_assumed_and_the_payload_matters(truearm:
     shifts = []
     for number, words in enumerate(([], ["--payload", "0kg,0mm,0mm,0mm"], ["--payload", "4kg,0mm,0mm,100mm"])):
         places = ("--tools", place / "cell.yaml", "--frames", place / "cell.yaml")
-        result = told(truearm, place, *places, *words, out=f"out{number}")
+        result = result_of(truearm, place, *places, *words, out=f"out{number}")
         shifts.append(result["programs"][0]["shift_mm"]["mean"])
         codes = [warning["code"] for warning in result["warnings"]]
         assert not {"frames-assumed", "tools-assumed"} & {*codes}
@@ -94,7 +94,7 @@ def test_a_robot_without_a_payload_is_asked_for_one_if_it_bends(truearm: Truearm
     plate(place, ("[2.7,[50,25,100]", "[0.001,[0,0,0.001]"))
     for robot, asked in ((worn().with_payload(Payload()), True), (stiff(), False)):
         (place / "calibrated.yaml").write_text(robot_text(robot))
-        result = told(truearm, place, out=f"out{asked}")
+        result = result_of(truearm, place, out=f"out{asked}")
         assert ("no-payload" in {warning["code"] for warning in result["warnings"]}) == asked
 
 
@@ -163,7 +163,7 @@ def test_a_move_on_which_the_posture_changes_is_not_split(truearm: Truearm, plac
 
 
 def test_a_tool_or_frame_that_nobody_defines_is_refused(truearm: Truearm, place: Path) -> None:
-    for change, said in (
+    for change, message in (
         (("tProbe:=[TRUE", "tOther:=[TRUE"), "line 7: this tool is used and never defined; got 'tProbe'"),
         (("wobjPlate:=[FALSE", "wobjP:=[FALSE"), "this frame is used and never defined; got 'wobjPlate'. Did you mean"),
     ):
@@ -171,18 +171,18 @@ def test_a_tool_or_frame_that_nobody_defines_is_refused(truearm: Truearm, place:
         before = program.read_bytes()
         code, words = run(truearm, place)
         assert code == 2
-        assert said in words
+        assert message in words
         assert program.read_bytes() == before
         assert not (place / "out").exists()
     # A frame may come from the file.
     cell(place, "frames:\n  WOBJPLATE: {of: controller, translation: [310, -110, 60]}\n")
-    content = told(truearm, place, "--frames", place / "cell.yaml")
+    content = result_of(truearm, place, "--frames", place / "cell.yaml")
     assert "frames-assumed" in {warning["code"] for warning in content["warnings"]}
 
 
 def test_a_program_without_targets_says_so(truearm: Truearm, place: Path) -> None:
     (place / "plate.mod").write_text('MODULE m\n  PROC main()\n    TPWrite "nothing";\n  ENDPROC\nENDMODULE\n')
-    result = told(truearm, place)
+    result = result_of(truearm, place)
     assert [warning["code"] for warning in result["warnings"]] == ["no-targets", "unproven"]
     shift = result["programs"][0]["shift_mm"]
     assert shift == {"mean": 0.0, "max": 0.0, "common": None, "remainder": None}
@@ -191,9 +191,9 @@ def test_a_program_without_targets_says_so(truearm: Truearm, place: Path) -> Non
 
 def test_a_folder_is_no_program(truearm: Truearm, place: Path) -> None:
     for words in ((), ("--revert",)):
-        code, said = run(truearm, place, *words, program=".")
+        code, output = run(truearm, place, *words, program=".")
         assert code == 2
-        assert "this is a folder, a program is needed" in said
+        assert "this is a folder, a program is needed" in output
 
 
 def test_what_was_left_or_is_on_an_edge_is_said_with_its_file(truearm: Truearm, place: Path) -> None:

@@ -50,9 +50,9 @@ def program(folder: Path, text: str) -> Path:
 
 
 def test_a_controller_that_is_surely_calibrated_is_asked_for_its_kinematics(tmp_path: Path) -> None:
-    for said in (None, "unknown"):
+    for stated in (None, "unknown"):
         with pytest.raises(InputError, match="compute with what the factory measured") as refusal:
-            compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=said)
+            compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=stated)
         assert refusal.value.parameter == "controller_kinematics"
         for words in ("calibration.conf", "`controller_kinematics=nominal`", "proprietary"):
             assert words in str(refusal.value)
@@ -108,17 +108,17 @@ def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path)
 
 def test_a_cell_file_keeps_the_answers(tmp_path: Path) -> None:
     job = [program(tmp_path, RAPID)]
-    kept = cell(tmp_path, "taught: [none]\ncontroller_kinematics: nominal\n")
+    answers = cell(tmp_path, "taught: [none]\ncontroller_kinematics: nominal\n")
     result = compensate(worn("irb120"), job)
     for built in (
-        truearm.compensate(worn("irb120"), job, tools=kept),
-        truearm.compensate(worn("irb120"), job, frames=kept),
+        truearm.compensate(worn("irb120"), job, tools=answers),
+        truearm.compensate(worn("irb120"), job, frames=answers),
     ):
         assert (built.files[0].text, built.applied()["taught"]) == (result.files[0].text, [])
         assert built.applied()["controller"] == result.applied()["controller"]
-    assert truearm.compensate(worn("irb120"), job, tools=kept, taught=["points"]).files[0].kept == {"taught": 1}
+    assert truearm.compensate(worn("irb120"), job, tools=answers, taught=["points"]).files[0].kept == {"taught": 1}
     with pytest.raises(InputError, match="two files answer this differently"):
-        truearm.compensate(worn("irb120"), job, tools=kept, frames=cell(tmp_path, "taught: [points]\n", "b.yaml"))
+        truearm.compensate(worn("irb120"), job, tools=answers, frames=cell(tmp_path, "taught: [points]\n", "b.yaml"))
     other = cell(tmp_path, "controller_kinematics: proprietary\n", "b.yaml")
     with pytest.raises(InputError, match="that nobody else can read"):
         compensate(worn("irb120"), job, controller_kinematics=None, frames=other)
@@ -186,16 +186,16 @@ def test_saying_what_the_controller_has_does_not_change_what_is_known_of_a_calib
 def test_the_command_names_its_option(truearm: Truearm, tmp_path: Path) -> None:
     (tmp_path / "worn.yaml").write_text(robot_text(worn("ur10")))
     answers = ("--taught", "none", "--out", tmp_path / "out")
-    given = ("compensate", tmp_path / "worn.yaml", program(tmp_path, POSES), *answers)
-    refused = truearm(*given)
+    command = ("compensate", tmp_path / "worn.yaml", program(tmp_path, POSES), *answers)
+    refused = truearm(*command)
     assert refused.code == 2
     assert "--controller-kinematics nominal" in " ".join(refused.err.split())
     (tmp_path / "calibration.conf").write_text(UR10_CONF)
-    other = truearm(*given, "--controller-kinematics", tmp_path / "calibration.conf")
+    other = truearm(*command, "--controller-kinematics", tmp_path / "calibration.conf")
     assert other.code == 2
     assert "--accept other-kinematics" in " ".join(other.err.split())
     accepted = ("--controller-kinematics", tmp_path / "calibration.conf", "--accept", "other-kinematics")
-    assert truearm(*given, *accepted).code == 0
+    assert truearm(*command, *accepted).code == 0
 
 
 def test_the_command_imports(truearm: Truearm, tmp_path: Path) -> None:
@@ -210,6 +210,6 @@ def test_the_command_imports(truearm: Truearm, tmp_path: Path) -> None:
     assert refused.code == 2
     assert "Of the library, ur10 and ur10e fit." in " ".join(refused.err.split())
     assert not (tmp_path / "no.yaml").exists()
-    told = truearm("import", "ur-kinematics", conf, "--robot", "ur10", "--out", tmp_path / "b.yaml", "--json")
-    assert '"type-not-told"' in told.out
-    assert '"joint_checksum": "0x6e0f7bf' in told.out
+    listing = truearm("import", "ur-kinematics", conf, "--robot", "ur10", "--out", tmp_path / "b.yaml", "--json")
+    assert '"type-not-told"' in listing.out
+    assert '"joint_checksum": "0x6e0f7bf' in listing.out

@@ -66,12 +66,12 @@ def planned(folder: Path, twin: Twin, speed: float, acceleration: float, step: f
 def true_errors(twin: Twin, path: CorrectedPath) -> dict[Knowledge, Array]:
     """How far the twin is from the path in motion [mm], by what the correction knows."""
     motion = path.motion
-    found: dict[Knowledge, Array] = {}
+    errors: dict[Knowledge, Array] = {}
     for name, joints in path.joints.items():
         went = twin.postures(joints, velocity=motion.velocity, acceleration=motion.acceleration)
         at = np.array([posture.targets["1"][:3, 3] for posture in went])
-        found[name] = 1e3 * np.linalg.norm(at - path.planned.trajectory.position, axis=1)
-    return found
+        errors[name] = 1e3 * np.linalg.norm(at - path.planned.trajectory.position, axis=1)
+    return errors
 
 
 def test_the_twin_keeps_to_a_corrected_path(measured: tuple[Twin, Robot], tmp_path: Path) -> None:

@@ -224,12 +224,12 @@ UTOOL: Final = "controller: {translation: [0, 0, 120]}"
 
 def test_a_measured_place_does_not_say_what_the_controller_has(tmp_path: Path) -> None:
     """It did, and programs were written that missed by 212 mm and by 242 mm on an independent twin."""
-    given, program = f"{world_entry()}, {UFRAME}", ls_program(tmp_path)
+    entries, program = f"{world_entry()}, {UFRAME}", ls_program(tmp_path)
     for frame, tool, parameter in (
         (world_entry(), f"of: flange, target: tip, {UTOOL}", "frames"),
         ("of: base, translation: [420, -150, -120], wpr: [0, 0, 10]", f"of: flange, target: tip, {UTOOL}", "frames"),
-        (given, "of: flange, target: tip", "tools"),
-        (given, "of: flange, translation: [0, 0, 120]", "tools"),
+        (entries, "of: flange, target: tip", "tools"),
+        (entries, "of: flange, translation: [0, 0, 120]", "tools"),
     ):
         places = fanuc_cell(tmp_path, frame, tool)
         with pytest.raises(InputError, match="nothing says which numbers the controller has") as refusal:
@@ -245,10 +245,10 @@ def test_with_the_numbers_of_the_controller_the_real_robot_goes_there(tmp_path: 
     result = truearm.compensate(robot, [ls_program(tmp_path)], tools=places, frames=places, **ANSWERED)
     assert result.files[0].corrected == 5
     known = Cell(read_tools(robot, places), read_frames(robot, places))
-    wanted, (one,) = true_frame() @ result.result.corrections[0].before, result.result.corrections
-    for program, least, most in ((one.program, 0.5e-3, 3e-3), (result.as_written()[0], 0.0, 2e-6)):
-        there, _ = robot.forward(commanded(robot, program, known), frame="world", target="tip")
-        missed = np.linalg.norm(there - wanted[:, :3, 3], axis=1)
+    wanted, (correction,) = true_frame() @ result.result.corrections[0].before, result.result.corrections
+    for program, least, most in ((correction.program, 0.5e-3, 3e-3), (result.as_written()[0], 0.0, 2e-6)):
+        reached, _ = robot.forward(commanded(robot, program, known), frame="world", target="tip")
+        missed = np.linalg.norm(reached - wanted[:, :3, 3], axis=1)
         assert least <= missed.min() <= missed.max() < most
     # What was read on the pendant alone is the controller's.
     read = fanuc_cell(tmp_path, UFRAME_READ, "of: controller, translation: [0, 0, 120]")

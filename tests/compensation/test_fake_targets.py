@@ -84,9 +84,9 @@ def test_ten_thousand_targets_of_the_measured_irb120(irb120: Robot, request: pyt
     rows = np.flatnonzero(~np.isnan(meant.joints).any(axis=1))[:count]
     assert len(rows) == count
     result = fake_targets(irb120, wanted[rows], meant.joints[rows])
-    there = np.linalg.inv(irb120.base.matrix) @ matrices(irb120, result.joints)
-    assert np.linalg.norm(there[:, :3, 3] - wanted[rows, :3, 3], axis=1).max() < 1e-9
-    turned = Rotation.from_matrix(np.swapaxes(there[:, :3, :3], 1, 2) @ wanted[rows, :3, :3]).magnitude()
+    reached = np.linalg.inv(irb120.base.matrix) @ matrices(irb120, result.joints)
+    assert np.linalg.norm(reached[:, :3, 3] - wanted[rows, :3, 3], axis=1).max() < 1e-9
+    turned = Rotation.from_matrix(np.swapaxes(reached[:, :3, :3], 1, 2) @ wanted[rows, :3, :3]).magnitude()
     assert turned.max() < 1e-8
     on_branch = np.array(branches(nominal, result.joints)) == asked[rows]
     assert on_branch.mean() >= 0.9999
@@ -97,8 +97,8 @@ def test_ten_thousand_targets_of_the_measured_irb120(irb120: Robot, request: pyt
 def test_the_nominal_robot_is_the_table_however_often_it_was_calibrated() -> None:
     robot = worn(load_robot("irb120"))
     again = robot.with_parameters(p.restarted(p.value) for p in robot.known.values())
-    for one in (robot, again):
-        nominal = nominal_robot(one)
+    for arm in (robot, again):
+        nominal = nominal_robot(arm)
         assert nominal.values["a_3"] == 0.27
         assert nominal.base.translation == (0.0, 0.0, 0.0)
 

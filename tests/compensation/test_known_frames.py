@@ -61,22 +61,22 @@ def apart(first: Robot, other: Robot, target: str | None = None) -> float:
 
 
 #: What was calibrated with what held: several tests read the same calibration.
-_HELD: dict[object, Calibration] = {}
+_CALIBRATED: dict[object, Calibration] = {}
 
 
-def held(hold: list[str], folder: Path, robot: str = "irb120", **more: Any) -> Calibration:
+def calibrated_holding(hold: list[str], folder: Path, robot: str = "irb120", **more: Any) -> Calibration:
     key = (robot, *hold, *more.items())
-    if key not in _HELD:
+    if key not in _CALIBRATED:
         twin, data = exact(robot)
         frames = frames_of(twin.robot, folder / "frames.yaml")
-        _HELD[key] = calibrate(robot, data, hold=hold, frames=frames, **more)
-    return _HELD[key]
+        _CALIBRATED[key] = calibrate(robot, data, hold=hold, frames=frames, **more)
+    return _CALIBRATED[key]
 
 
 @pytest.mark.parametrize(("robot", "redundancy"), [("irb120", "prior"), ("irb120", "drop"), ("katana450", "prior")])
 def test_with_true_frames_the_flange_is_where_it_is(robot: str, redundancy: str, tmp_path: Path) -> None:
     """Base and tool known: not only the targets, the flange itself stands right in the base."""
-    result = held(["base", "targets"], tmp_path, robot, redundancy=redundancy)
+    result = calibrated_holding(["base", "targets"], tmp_path, robot, redundancy=redundancy)
     twin = exact(robot)[0].robot
     assert result.warnings == () or {n.code for n in result.warnings} <= {"redundant", "parallel-axes"}
     assert all(apart(result.robot, twin, target.name) < 1e-9 for target in twin.targets)
@@ -95,7 +95,7 @@ def test_with_true_frames_the_flange_is_where_it_is(robot: str, redundancy: str,
 
 def test_what_is_held_stays_and_the_rest_is_found(tmp_path: Path) -> None:
     for hold in (["base"], ["targets"], ["1"], ["base", "2"]):
-        result = held(hold, tmp_path)
+        result = calibrated_holding(hold, tmp_path)
         twin = exact()[0].robot
         assert result.nominal.position is not None, hold
         assert all(apart(result.robot, twin, target.name) < 1e-9 for target in twin.targets), hold
@@ -109,7 +109,7 @@ def test_what_is_held_stays_and_the_rest_is_found(tmp_path: Path) -> None:
 
 
 def test_what_was_held_is_said_everywhere(tmp_path: Path) -> None:
-    outcome = held(["base", "1", "2", "3"], tmp_path, out=tmp_path / "out")
+    outcome = calibrated_holding(["base", "1", "2", "3"], tmp_path, out=tmp_path / "out")
     assert "Held at known places: base, target 1, target 2, target 3" in outcome.lines()
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     assert result["held"] == ["base", "target 1", "target 2", "target 3"]
@@ -131,7 +131,7 @@ def test_what_was_held_is_said_everywhere(tmp_path: Path) -> None:
 
 
 def test_the_base_stays_known_when_the_robot_is_placed_anew(tmp_path: Path) -> None:
-    first = held(["base", "targets"], tmp_path)
+    first = calibrated_holding(["base", "targets"], tmp_path)
     elsewhere = calibrate(first.robot, exact()[1], model="frames")
     assert elsewhere.robot.proof is not None
     assert elsewhere.robot.proof.held == ("base", "flange")
@@ -143,24 +143,24 @@ def test_no_base_and_no_flange_is_assumed_in_programs_where_they_were_held(tmp_p
         plate = RAPID.read([Source(Path("plate.mod"), PLATE)])
         return corrected_programs(robot, [plate], EMPTY_CELL, choice=Choice(taught=frozenset()))
 
-    result = corrected(held(["base", "targets"], tmp_path).robot)
+    result = corrected(calibrated_holding(["base", "targets"], tmp_path).robot)
     assert (result.frames.tools, result.frames.frames) == ("held", "held")
     np.testing.assert_allclose(result.frames.base, np.eye(4), atol=0)
     np.testing.assert_allclose(result.frames.flange, np.eye(4), atol=0)
-    one, twin = result.corrections[0], exact()[0].robot
-    rows = np.flatnonzero(one.corrected)
-    tool = next(iter(one.program.tools.values())).matrix
+    correction, twin = result.corrections[0], exact()[0].robot
+    rows = np.flatnonzero(correction.corrected)
+    tool = next(iter(correction.program.tools.values())).matrix
     # Sent there, the twin is in its own base where the program means it, which a shift of the base would spoil.
-    reached = np.linalg.inv(twin.base.matrix) @ matrices(twin, one.joints[rows]) @ tool
-    np.testing.assert_allclose(reached, one.tips[rows], atol=1e-7)
-    assert one.moved[rows].mean() > 1e-4
+    reached = np.linalg.inv(twin.base.matrix) @ matrices(twin, correction.joints[rows]) @ tool
+    np.testing.assert_allclose(reached, correction.tips[rows], atol=1e-7)
+    assert correction.moved[rows].mean() > 1e-4
     other = corrected(identify(library_robot("irb120"), exact()[1], GEOMETRIC).robot)
     assert (other.frames.tools, other.frames.frames) == ("assumed", "assumed")
     assert not np.allclose(other.frames.base, np.eye(4), atol=1e-6)
 
 
 def test_a_tool_point_that_was_held_stays_on_the_flange_in_programs(tmp_path: Path) -> None:
-    robot = held(["base", "1"], tmp_path).robot
+    robot = calibrated_holding(["base", "1"], tmp_path).robot
     base, flange = best_agreement(robot)
     np.testing.assert_allclose(base, np.eye(4), atol=0)
     point = np.array([robot.values[f"target_1_{axis}"] for axis in "xyz"])
@@ -292,7 +292,7 @@ def test_what_readings_of_fixtures_cannot_hold_is_refused(tmp_path: Path) -> Non
 
 
 def test_a_robot_in_its_own_frame_takes_the_place_of_a_target_from_its_file(tmp_path: Path) -> None:
-    tool = held(["base"], tmp_path, model="frames")  # a tool alone, in a base that is known
+    tool = calibrated_holding(["base"], tmp_path, model="frames")  # a tool alone, in a base that is known
     assert set(tool.fit.free.names) == {f"target_{n}_{a}" for n in "123" for a in "xyz"}
     path = cell_file(tmp_path / "t.yaml", {n: {"of": "flange", "target": n} for n in "123"}, {})
     result = calibrate(tool.robot, exact()[1], hold=["targets"], frames=path)

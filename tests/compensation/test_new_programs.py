@@ -129,8 +129,8 @@ def test_targets_are_some_time_apart_and_ends_of_sections_are_among_them(paths: 
     assert program.durations.sum() == pytest.approx(path.motion.time[-1])
     ends = [int(np.flatnonzero(path.planned.section == number)[-1]) for number in (1, 2)]
     for end in ends:
-        there = calibrated().controller.from_model(path.joints["geometry"][end : end + 1])
-        assert np.abs(program.joints - there).max(axis=1).min() < 1e-12
+        position = calibrated().controller.from_model(path.joints["geometry"][end : end + 1])
+        assert np.abs(program.joints - position).max(axis=1).min() < 1e-12
     assert program.blend(0) == program.blend(len(program) - 1) == 0.0
     assert 0.0 < program.blend(3) <= 1e-3
 

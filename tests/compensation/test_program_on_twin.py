@@ -145,8 +145,8 @@ def test_without_frames_targets_are_right_to_each_other(campaign: tuple[Twin, Ca
     result, after = corrected(calibration, program, Cell({}, {}))
     rows = poses_corrected(result)
     shapes = []
-    for one in (program, after):
-        tips = twin.frames(commanded(calibration.robot, one)[rows])["1"][:, :3, 3]
+    for shown in (program, after):
+        tips = twin.frames(commanded(calibration.robot, shown)[rows])["1"][:, :3, 3]
         shapes.append(fitted(tips, result.before[rows, :3, 3]).mean())
     assert shapes[1] < 1.5 * float(calibration.validation.position_norms.mean())
     assert shapes[1] < 0.4 * shapes[0]
@@ -363,24 +363,24 @@ def test_a_program_that_would_get_worse_stays_as_it_was(tmp_path: Path) -> None:
     everything = on_the_plate(twin, calibration, tmp_path, accept=["not-better-here"])
     before, after = missed_by(twin, everything)
     assert after > 1.1 * before
-    done = on_the_plate(twin, calibration, tmp_path)
-    assert missed_by(twin, done)[1] == pytest.approx(before, rel=0.01)
-    assert {"not-better-here", "narrow-data"} <= {notice.code for notice in done.warnings}
-    (notice,) = [notice for notice in done.warnings if notice.code == "not-better-here"]
+    outcome = on_the_plate(twin, calibration, tmp_path)
+    assert missed_by(twin, outcome)[1] == pytest.approx(before, rel=0.01)
+    assert {"not-better-here", "narrow-data"} <= {notice.code for notice in outcome.warnings}
+    (notice,) = [notice for notice in outcome.warnings if notice.code == "not-better-here"]
     assert "stay as before" in notice.message
     assert "outside of what was measured" in notice.message
 
 
 def test_a_program_that_gets_better_is_corrected_all_the_same(tmp_path: Path) -> None:
     twin, calibration = far_from_the_plate(8)
-    done = on_the_plate(twin, calibration, tmp_path)
-    before, after = missed_by(twin, done)
+    outcome = on_the_plate(twin, calibration, tmp_path)
+    before, after = missed_by(twin, outcome)
     assert after < 0.2 * before
-    assert done.files[0].corrected == done.files[0].targets
-    assert "not-better-here" not in {notice.code for notice in done.warnings}
-    assert done.files[0].expected is not None
+    assert outcome.files[0].corrected == outcome.files[0].targets
+    assert "not-better-here" not in {notice.code for notice in outcome.warnings}
+    assert outcome.files[0].expected is not None
     # It knows that it is not known to 0.03 mm here, as the held-out configurations would have it.
-    assert 0.3e-3 < done.files[0].expected[1].mean() < 3e-3
+    assert 0.3e-3 < outcome.files[0].expected[1].mean() < 3e-3
 
 
 def test_three_configurations_correct_nothing(tmp_path: Path) -> None:

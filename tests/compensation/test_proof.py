@@ -88,8 +88,8 @@ def test_a_warning_that_concerns_programs_is_repeated_and_refuses_nothing(robot:
     data = campaign("irb120", 20, 2e-5, 1)[1]
     off = replace(data, joints=data.joints + np.radians([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
     result = truearm.calibrate("irb120", off).robot
-    for one in (result, truearm.calibrate(result, off, model="frames").robot):
-        assert codes(compensate(one, [program]))["far-from-nominal"] == "note"
+    for arm in (result, truearm.calibrate(result, off, model="frames").robot):
+        assert codes(compensate(arm, [program]))["far-from-nominal"] == "note"
 
 
 def test_a_program_of_another_maker_is_not_corrected_unless_accepted(robot: Robot, program: Path) -> None:
@@ -107,8 +107,8 @@ def test_narrow_data_are_judged_target_by_target_but_of_an_edited_robot(robot: R
     narrow = ended(robot, "converged", NARROW)
     assert codes(compensate(narrow, [program]))["narrow-data"] == "warning"
     # That is not cleared of how its fit ended.
-    for one, code in ((narrow, "narrow-data"), (ended(robot, "rank-loss"), "rank-loss")):
-        edited = one.with_values({"a_3": 0.2703})
+    for doubted, code in ((narrow, "narrow-data"), (ended(robot, "rank-loss"), "rank-loss")):
+        edited = doubted.with_values({"a_3": 0.2703})
         with pytest.raises(InputError, match=f"got '{code}'"):
             compensate(edited, [program])
         result = compensate(edited, [program], accept=[code])
@@ -119,9 +119,12 @@ def test_narrow_data_are_judged_target_by_target_but_of_an_edited_robot(robot: R
 def test_only_known_names_are_accepted(robot: Robot, program: Path) -> None:
     always = "maker, other-kinematics, numbers-read, skipped, not-better-here"
     signs = ended(robot, "converged", SIGNS)
-    for one, wrong, known in ((robot, "rank-lost", "narrow-data, wrong-robot"), (signs, "joint-signs", "joint-sign")):
+    for doubted, wrong, known in (
+        (robot, "rank-lost", "narrow-data, wrong-robot"),
+        (signs, "joint-signs", "joint-sign"),
+    ):
         with pytest.raises(InputError, match=f"{known}, {always}") as refusal:
-            compensate(one, [program], accept=[wrong])
+            compensate(doubted, [program], accept=[wrong])
         assert refusal.value.parameter == "accept"
     assert codes(compensate(robot, [program], accept=["rank-loss"])) == codes(compensate(robot, [program]))
 
@@ -150,8 +153,8 @@ def test_joints_for_poses_and_exports_are_made_with_a_warning(robot: Robot, tmp_
         (table.warnings, table.lines(), table.summary()),
         (exported.warnings, exported.lines(), exported.summary()),
     ):
-        told = {notice.code: notice.level for notice in warnings if notice.code != "left-out"}
-        assert told == dict.fromkeys(("rank-loss", "joint-sign", "edited-by-hand"), "warning")
+        levels = {notice.code: notice.level for notice in warnings if notice.code != "left-out"}
+        assert levels == dict.fromkeys(("rank-loss", "joint-sign", "edited-by-hand"), "warning")
         assert "Joint 6 turns the other way." in "\n".join(lines)
         assert {"rank-loss", "joint-sign", "edited-by-hand"} <= {notice["code"] for notice in summary["warnings"]}
     assert truearm.inverse(robot, position, rotation).warnings == ()
@@ -162,27 +165,29 @@ def test_what_is_expected_is_told(robot: Robot, program: Path, tmp_path: Path) -
     result = compensate(robot, [program], out=tmp_path / "out")
     (file,) = result.files
     assert file.expected is not None
-    before, now = file.expected
-    assert len(before) == len(now) == 43
-    assert 0.0 < now.mean() < before.mean()
-    (told,) = result.summary()["programs"]
-    assert told["expected_mm"]["before"]["max"] == pytest.approx(1e3 * before.max())
-    assert told["expected_mm"]["after"]["mean"] == pytest.approx(1e3 * now.mean())
+    before, after = file.expected
+    assert len(before) == len(after) == 43
+    assert 0.0 < after.mean() < before.mean()
+    (summary,) = result.summary()["programs"]
+    assert summary["expected_mm"]["before"]["max"] == pytest.approx(1e3 * before.max())
+    assert summary["expected_mm"]["after"]["mean"] == pytest.approx(1e3 * after.mean())
     message = result.lines()[1]
-    assert f"RAPID: relative error to expect {1e3 * before.mean():.3f} mm before, {1e3 * now.mean():.3f} mm" in message
-    assert f"largest expected, not a bound: {1e3 * before.max():.3f} and {1e3 * now.max():.3f} mm" in message
+    assert (
+        f"RAPID: relative error to expect {1e3 * before.mean():.3f} mm before, {1e3 * after.mean():.3f} mm" in message
+    )
+    assert f"largest expected, not a bound: {1e3 * before.max():.3f} and {1e3 * after.max():.3f} mm" in message
     assert "at most" not in message
     page = (tmp_path / "out" / "compensation.html").read_text()
     assert 'id="expected"' in page
-    assert f'<td class="n">{1e3 * now.mean():.3f}</td>' in page
+    assert f'<td class="n">{1e3 * after.mean():.3f}</td>' in page
 
 
 def test_targets_that_were_measured_nowhere_near_are_named(robot: Robot, program: Path) -> None:
     assert robot.proof is not None
     (low, high), *others = robot.proof.region
     turned = with_proof(robot, region=((low + 2 * np.pi, high + 2 * np.pi), *others))
-    for one in (robot, turned):
-        assert "beyond-measured" not in codes(compensate(one, [program]))
+    for arm in (robot, turned):
+        assert "beyond-measured" not in codes(compensate(arm, [program]))
     elsewhere = with_proof(robot, region=((1.5, 2.0), *others))
     (notice,) = [n for n in compensate(elsewhere, [program]).warnings if n.code == "beyond-measured"]
     assert "axis_1 stood well outside the range measured in calibration: plate.mod line 8" in notice.message
@@ -229,21 +234,21 @@ def test_targets_that_rather_get_worse_are_kept_and_listed(robot: Robot, program
     vague = with_proof(robot, deviations=tuple(50.0 * d for d in robot.proof.deviations))
     result = compensate(vague, [program], out=tmp_path / "out")
     (file,) = result.files
-    kept = [row for row in file.not_better if not file.correction.corrected[row]]
-    assert kept
+    unchanged = [row for row in file.not_better if not file.correction.corrected[row]]
+    assert unchanged
     assert codes(result)["not-better-here"] == "warning"
-    assert ("nothing-corrected" in codes(result)) is (len(kept) == 43)
+    assert ("nothing-corrected" in codes(result)) is (len(unchanged) == 43)
     content = result.summary()["programs"][0]
-    assert content["corrected"] == 43 - len(kept)
+    assert content["corrected"] == 43 - len(unchanged)
     assert len(content["not_better"]) == len(file.not_better)
     assert all(row["probability_worse"] > 0.1 or row["kept"] for row in content["not_better"])
-    np.testing.assert_array_equal(file.correction.after[kept], file.correction.before[kept])
+    np.testing.assert_array_equal(file.correction.after[unchanged], file.correction.before[unchanged])
     again = result.as_written()[0].targets
-    for row in kept:
+    for row in unchanged:
         assert again[row].values == file.correction.program.targets[row].values
     page = (tmp_path / "out" / "compensation.html").read_text()
     assert 'id="not-better"' in page
-    assert page.count("<td>kept</td>") == len(kept)
+    assert page.count("<td>kept</td>") == len(unchanged)
     all_of_them = compensate(vague, [program], accept=["not-better-here"])
     assert all_of_them.files[0].corrected == 43
     (notice,) = [notice for notice in all_of_them.warnings if notice.code == "not-better-here"]

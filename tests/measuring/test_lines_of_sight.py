@@ -40,7 +40,7 @@ def test_the_arm_hides_what_lies_behind_a_link() -> None:
                 assert (name in result[k]) == (least < 0)
                 counts[int(least < 0)] += 1
     assert min(counts) > 10
-    assert {words for one in result for words in one.values()} == {"the arm"}
+    assert {words for reasons in result for words in reasons.values()} == {"the arm"}
 
 
 def test_a_box_hides_what_lies_behind_it_and_is_named() -> None:

@@ -344,9 +344,9 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
             refuse_unanswered([controller_question(arm, as_read)])
             notices += controller_notices(arm, as_read)
         texts |= files
-    foreign = [each for each in languages if arm.maker and not each.runs_on(arm.maker)]
+    foreign = [dialect for dialect in languages if arm.maker and not dialect.runs_on(arm.maker)]
     if foreign:
-        written = ", ".join(f"{each.name} of {each.makers[0]}" for each in foreign)
+        written = ", ".join(f"{dialect.name} of {dialect.makers[0]}" for dialect in foreign)
         notices.append(MAKER(f"{arm.name} is of {arm.maker}, and programs were written in {written}."))
     if content.beside > _FAR:
         notices.append(
@@ -354,7 +354,7 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
                 f"Between its targets the program leaves the path by up to {millimetres(content.beside)} mm."
             )
         )
-    untimed = [each.name for each in languages if content.untimed(each.name)]
+    untimed = [dialect.name for dialect in languages if content.untimed(dialect.name)]
     if untimed:
         notices.append(
             UNTIMED_MOVES(

@@ -190,7 +190,7 @@ class _Tally:
         blocks = [block for group in groups for block in group]
         most = max((rows.stop - rows.start) * (columns.stop - columns.start) for rows, columns, _ in blocks)
         self._points = points
-        self._room = np.empty((3, most))
+        self._buffer = np.empty((3, most))
         self._single = np.empty((3, most), dtype=np.float32)
         self._bins = np.zeros(most, dtype=np.uint8)
         self._twos = np.zeros(2**16, dtype=np.int64)
@@ -206,7 +206,7 @@ class _Tally:
             sums = self._by_products(rows, columns)
             if sums is not None:
                 return sums
-        error, other, spare = self._shaped(self._room, rows, columns)
+        error, other, spare = self._shaped(self._buffer, rows, columns)
         _distances(self._points.predicted, rows, columns, error, spare)
         error -= _distances(self._points.measured, rows, columns, other, spare)
         flat = error.reshape(-1) if counted is None else error[counted]
@@ -221,7 +221,7 @@ class _Tally:
     def _by_products(self, rows: slice, columns: slice) -> tuple[float, float] | None:
         """Do so by two matrix products, or return None if too many pairs are close."""
         points = self._points
-        numerator, squares, _ = self._shaped(self._room, rows, columns)
+        numerator, squares, _ = self._shaped(self._buffer, rows, columns)
         for (left, right), product in ((points.numerator, numerator), (points.squares, squares)):
             np.matmul(left[rows], right[:, columns], out=product)
         error, square, spare = (buffer.reshape(-1) for buffer in self._shaped(self._single, rows, columns))

@@ -63,7 +63,7 @@ def test_its_size_is_that_where_it_was_measured() -> None:
 
 def test_the_strongest_periods_are_told_with_their_neighbours() -> None:
     result = curve({1: 3.0, 19: 5.0, 20: 6.0, 21: 5.5, 22: 4.5, 50: 1.0, 58: 0.1}, EVERYWHERE)
-    assert [one.range for one in result.strongest] == ["19 to 22", "1", "50"]
+    assert [group.range for group in result.strongest] == ["19 to 22", "1", "50"]
     assert math.degrees(result.strongest[0].amplitude) == pytest.approx(1e-3 * math.sqrt(25 + 36 + 30.25 + 20.25))
     assert lines_of([curve_block(result)]) == [
         "Joint 2: curve of 0.0078 +- 0.0004 deg rms, strongest at 19 to 22 periods a turn"
@@ -88,15 +88,16 @@ def test_curves_of_a_fit_are_those_of_its_parameters() -> None:
     result = fitted_curves(fit, data)
     q = np.linspace(-1.0, 1.0, 7)
     values, uncertain, covariance = fit.robot.values, (*fit.free.names, *fit.unfitted), fit.covariance_with_unfitted
-    for one in result:
+    for fitted_curve in result:
         expected = sum(
-            values[f"curve_sin{k}_{one.number}"] * np.sin(k * q) + values[f"curve_cos{k}_{one.number}"] * np.cos(k * q)
+            values[f"curve_sin{k}_{fitted_curve.number}"] * np.sin(k * q)
+            + values[f"curve_cos{k}_{fitted_curve.number}"] * np.cos(k * q)
             for k in range(1, 61)
         )
-        assert_allclose(one.at(q)[0], expected, atol=1e-15)
-        for place, name in enumerate(curve_names(one.number)):
+        assert_allclose(fitted_curve.at(q)[0], expected, atol=1e-15)
+        for place, name in enumerate(curve_names(fitted_curve.number)):
             index = uncertain.index(name) if name in uncertain else None
-            assert one.covariance[place, place] == (0.0 if index is None else covariance[index, index])
+            assert fitted_curve.covariance[place, place] == (0.0 if index is None else covariance[index, index])
     assert result
     without = replace(fit, robot=fit.robot.with_values({n: 0.0 for n in fit.free.names if n.startswith("curve_")}))
     assert fitted_curves(without, data) == ()

@@ -105,7 +105,7 @@ def test_noise_alone_is_the_instruments() -> None:
 
 def test_the_share_of_the_parameters_is_what_they_do_at_unseen_poses() -> None:
     result = [judged("random", 14, 0.05e-3, seed) for seed in range(6)]
-    true = [of_the_model(fit, twin, rest) for _, fit, twin, rest in result]
+    true = [of_the_model(fit, twin, others) for _, fit, twin, others in result]
     shares = [square(budget, "parameters") for budget, *_ in result]
     doubt = np.linalg.norm([budget.share("parameters").deviation for budget, *_ in result]) / len(result)
     assert abs(np.mean(shares) - np.mean(true)) < 2.5 * doubt < 0.7 * np.mean(true)
@@ -115,8 +115,8 @@ def test_the_share_of_the_parameters_is_what_they_do_at_unseen_poses() -> None:
 
 def test_what_the_model_lacks_is_found() -> None:
     result = [judged("tracker-triangular", 80, 0.02e-3, n % 3, declared=1.0 if n < 3 else None) for n in range(6)]
-    for budget, fit, twin, rest in result:
-        true = of_the_model(fit, twin, rest)
+    for budget, fit, twin, others in result:
+        true = of_the_model(fit, twin, others)
         explained = square(budget, "model") + square(budget, "parameters")
         doubt = np.hypot(budget.share("model").deviation, budget.share("parameters").deviation)
         assert abs(explained - true) < 3 * np.hypot(doubt, budget.deviation)
@@ -131,8 +131,8 @@ def test_repeatability_is_told_from_the_model_where_postures_were_visited_again(
     at = measure(twin, remaining.joints, 0.0, np.random.default_rng(0)).position
     moved = 0.0
     for joint in range(6):
-        there = measure(twin, remaining.joints + 1e-6 * np.eye(6)[joint], 0.0, np.random.default_rng(0)).position
-        moved += float(np.mean(np.sum(((there - at) / 1e-6) ** 2, axis=1)))
+        repeated = measure(twin, remaining.joints + 1e-6 * np.eye(6)[joint], 0.0, np.random.default_rng(0)).position
+        moved += float(np.mean(np.sum(((repeated - at) / 1e-6) ** 2, axis=1)))
     share = budget.share("repeatability")
     assert share.square == pytest.approx(moved * repeat**2, abs=3 * share.deviation)
     assert share.deviation < 0.2 * moved * repeat**2

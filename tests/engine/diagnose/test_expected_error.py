@@ -250,8 +250,8 @@ def test_narrow_data_are_an_error_that_names_the_joints() -> None:
     # less narrow data are a warning
     rng = np.random.default_rng(3)
     twin = truth_twin(IRB120, "random", rng)
-    one = replace(twin, robot=twin.robot.with_frames(twin.robot.base, {"1": (0.0, 0.0, 0.125)}))
-    data = measure(one, narrowed(40.0).random_configurations(60, rng), 0.02e-3, rng)
+    narrow = replace(twin, robot=twin.robot.with_frames(twin.robot.base, {"1": (0.0, 0.0, 0.125)}))
+    data = measure(narrow, narrowed(40.0).random_configurations(60, rng), 0.02e-3, rng)
     result = calibrate(IRB120, data)
     (notice,) = (n for n in result.warnings if n.code == "narrow-data")
     assert notice.level == "warning"

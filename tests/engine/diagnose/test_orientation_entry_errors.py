@@ -115,8 +115,8 @@ def test_a_check_says_it_too_and_nothing_of_sound_orientations() -> None:
 def test_the_fit_says_the_cause() -> None:
     run = calibrate(ROBOT, read_otherwise("fixed for moving"))
     assert run.warnings[0].code == "orientation-order"
-    (told,) = [notice for notice in run.warnings if notice.code == "implausible"]
-    assert "The cause is most likely what orientation-order says" in told.message
+    (warning,) = [notice for notice in run.warnings if notice.code == "implausible"]
+    assert "The cause is most likely what orientation-order says" in warning.message
 
 
 def test_honest_orientations_are_left_alone() -> None:

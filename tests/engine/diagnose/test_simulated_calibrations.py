@@ -36,8 +36,8 @@ def read(repeat: float = 0.0, poses: int = 40, seed: int = 1) -> tuple[Twin, Dat
     rng = np.random.default_rng(seed)
     twin = truth_twin(ROBOT, "random", rng)
     joints = ROBOT.random_configurations(poses, rng)
-    there = joints + repeat * rng.standard_normal(joints.shape)
-    return twin, replace(measure(twin, there, 0.05e-3, rng), joints=joints)
+    driven = joints + repeat * rng.standard_normal(joints.shape)
+    return twin, replace(measure(twin, driven, 0.05e-3, rng), joints=joints)
 
 
 def informed(fit: Fit, names: Sequence[str]) -> NDArray[np.bool_]:
@@ -64,7 +64,7 @@ def test_where_all_is_linear_it_agrees_with_the_covariance(repeat: float, redund
 
 
 def test_its_intervals_hold_the_truth() -> None:
-    held, count = 0, 0
+    within, count = 0, 0
     for seed in range(4):
         twin, data = read(seed=seed)
         fit = identify(ROBOT, data, MODEL["geometric"])
@@ -73,10 +73,10 @@ def test_its_intervals_hold_the_truth() -> None:
         truth = np.array([twin.robot.values.get(name, np.nan) for name in simulated.names])
         low, high = simulated.interval_95.T
         known = own & np.isfinite(truth)
-        held += int(((low <= truth) & (truth <= high))[known].sum())
+        within += int(((low <= truth) & (truth <= high))[known].sum())
         count += int(known.sum())
     assert count > 40
-    assert 0.85 < held / count <= 1.0
+    assert 0.85 < within / count <= 1.0
 
 
 def test_residuals_that_joints_do_not_explain_are_drawn_as_they_are() -> None:

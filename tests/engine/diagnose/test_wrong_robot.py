@@ -180,17 +180,17 @@ def test_wrong_data_are_said_before_the_robot_is_doubted() -> None:
 def test_one_factor_in_all_lengths_is_a_wrong_length_of_the_measurement() -> None:
     """Robots within their priors, read by an instrument that takes a millimetre for 0.985 mm, or for what it is."""
     robot = load_robot("irb120")
-    told: dict[float, list[str]] = {1.0: [], 1.015: []}
+    codes: dict[float, list[str]] = {1.0: [], 1.015: []}
     for seed in range(6):
         rng = np.random.default_rng(seed)
         data = measure(truth_twin(robot, "random", rng), robot.random_configurations(30, rng), 5e-5, rng)
-        for factor in told:
+        for factor in codes:
             warnings = doubts(robot, replace(data, position=factor * data.position))
             assert all(n.level == "error" for n in warnings)
-            told[factor] += [n.code for n in warnings]
-    assert told[1.0] == []
-    assert len(told[1.015]) >= 5
-    assert set(told[1.015]) == {"lengths-scaled", "wrong-robot"}
+            codes[factor] += [n.code for n in warnings]
+    assert codes[1.0] == []
+    assert len(codes[1.015]) >= 5
+    assert set(codes[1.015]) == {"lengths-scaled", "wrong-robot"}
 
 
 def test_a_scale_that_is_known_is_known_of_lengths() -> None:

@@ -24,7 +24,7 @@ from truearm.engine.fit.design import (
 from truearm.engine.robot.chain import Array
 
 
-def told(rows: Array, chosen: list[int], known: Array, interest: int) -> float:
+def information_of(rows: Array, chosen: list[int], known: Array, interest: int) -> float:
     """Return minus the logarithm of the determinant of the covariance of the parameters of interest."""
     J = rows[chosen].reshape(-1, rows.shape[2])
     covariance = np.linalg.inv(known + J.T @ J)
@@ -42,9 +42,9 @@ def test_hardly_any_choice_tells_more() -> None:
             rng = np.random.default_rng(seed)
             rows, known = rng.normal(size=(12, 2, 4)), 0.01 * np.eye(4)
             chosen = most_informative(rows, 4, known, OfInterest(interest))
-            every = np.array([told(rows, list(c), known, interest) for c in combinations(range(12), 4)])
+            every = np.array([information_of(rows, list(c), known, interest) for c in combinations(range(12), 4)])
             assert len(set(chosen)) == 4
-            result = told(rows, chosen, known, interest)
+            result = information_of(rows, chosen, known, interest)
             assert result > every.max() - 0.1, (interest, seed)
             assert np.mean(every > result) < 0.02, (interest, seed)
 
@@ -106,7 +106,7 @@ def test_the_promise_is_the_first_order_of_what_is_added() -> None:
     for index in (*INDICES.values(), OfInterest(2)):
         step = 1e-6
         each = step * rows.swapaxes(1, 2) @ rows
-        added = [index.value(total + one) - index.value(total - one) for one in each]
+        added = [index.value(total + each_row) - index.value(total - each_row) for each_row in each]
         promised = candidates.promise(index.slope(total))
         assert promised == pytest.approx(np.array(added) / (2 * step), rel=1e-3, abs=1e-6)
 
@@ -195,5 +195,5 @@ def test_many_at_once_as_one_by_one() -> None:
     A = np.random.default_rng(3).normal(size=(7, 9, 4))
     M = A.swapaxes(1, 2) @ A
     for objective in (*INDICES.values(), OfInterest(2), predictions()):
-        assert objective.value(M) == pytest.approx([float(objective.value(one)) for one in M])
-        assert objective.slope(M) == pytest.approx(np.array([objective.slope(one) for one in M]))
+        assert objective.value(M) == pytest.approx([float(objective.value(matrix)) for matrix in M])
+        assert objective.slope(M) == pytest.approx(np.array([objective.slope(matrix) for matrix in M]))

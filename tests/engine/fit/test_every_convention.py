@@ -69,8 +69,8 @@ def test_conventions_that_can_tilt_parallel_axes_find_the_same_robot_and_common_
 
 def test_zeros_of_the_joints_are_among_what_twists_say_twice() -> None:
     """A joint's zero turns all axes beyond it, which their own slides and tilts can do as well."""
-    held: tuple[Redundancy, ...] = another_truth("product-of-exponentials")[0].redundancies
-    involved = {member for r in held for member in r.members}
+    redundancies: tuple[Redundancy, ...] = another_truth("product-of-exponentials")[0].redundancies
+    involved = {member for r in redundancies for member in r.members}
     assert {f"theta_offset_{i}" for i in range(1, 7)} <= involved
 
 

@@ -97,7 +97,7 @@ def test_the_sum_of_distances_is_minimal() -> None:
     def total(vector: Array, problem: Problem = problem) -> float:
         return float(np.linalg.norm(problem.residual(vector).reshape(-1, 3), axis=1).sum())
 
-    x, other = (np.array([one.robot.values[n] for n in one.free.names]) for one in (fit, plain))
+    x, other = (np.array([either.robot.values[n] for n in either.free.names]) for either in (fit, plain))
     best = total(x)
     rng = np.random.default_rng(0)
     scale = 1.0 / np.linalg.norm(problem.linearised(x)[1], axis=0)
@@ -118,10 +118,10 @@ def test_bounds_hold_and_are_reported() -> None:
     assert same.status is Status.CONVERGED
     for name in free.free.names:
         assert same.robot.values[name] == pytest.approx(free.robot.values[name], abs=1e-8), name
-    held = identify(load_robot("irb120"), data, GEOMETRIC, bounds=bounds_of(a_3=0))
-    a_3 = held.robot.parameters["a_3"]  # at its bound, and not uncertain
+    bounded = identify(load_robot("irb120"), data, GEOMETRIC, bounds=bounds_of(a_3=0))
+    a_3 = bounded.robot.parameters["a_3"]  # at its bound, and not uncertain
     assert (a_3.value, a_3.deviation, a_3.informed) == (a_3.nominal, None, None)
-    assert held.covariance[held.free.names.index("a_3")].tolist() == [0.0] * len(held.free.names)
+    assert bounded.covariance[bounded.free.names.index("a_3")].tolist() == [0.0] * len(bounded.free.names)
 
 
 def test_the_order_of_readings_does_not_matter() -> None:

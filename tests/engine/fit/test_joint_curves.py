@@ -69,10 +69,10 @@ def test_curves_that_were_found_are_not_lost_where_noise_is_small() -> None:
 # -- stiffness
 
 Numbers = NDArray[np.intp]
-Made = tuple[Array, Array, Array, Numbers, Numbers]
+Synthetic = tuple[Array, Array, Array, Numbers, Numbers]
 
 
-def synthetic(rows: int, joints: int, variance: Array, rng: np.random.Generator, arc: float = 2 * math.pi) -> Made:
+def synthetic(rows: int, joints: int, variance: Array, rng: np.random.Generator, arc: float = 2 * math.pi) -> Synthetic:
     """Return derivatives by 5 other parameters and by curves, right sides, and joint and period of each coefficient."""
     highest = len(variance) // (2 * joints)
     F = np.column_stack(
@@ -112,7 +112,7 @@ def test_variances_are_those_that_were_drawn() -> None:
     truth[60:] = 0.0  # the other joint has no curve
     ratios = []
     for _ in range(5):
-        estimate = curve_variances(*_given(synthetic(1500, 2, truth, rng)))
+        estimate = curve_variances(*_inputs(synthetic(1500, 2, truth, rng)))
         assert set(estimate.gains) == {0}
         assert not estimate.variance[60:].any()
         assert estimate.noise == pytest.approx(1.0, abs=0.15)
@@ -120,7 +120,7 @@ def test_variances_are_those_that_were_drawn() -> None:
     assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.4)  # the rare ones are shrunk towards the rest
 
 
-def _given(result: Made) -> tuple[Array, float, Numbers, Numbers]:
+def _inputs(result: Synthetic) -> tuple[Array, float, Numbers, Numbers]:
     A, F, z, joint, period = result
     return moments_of(A, F, z), float(len(z)), joint, period
 
@@ -128,7 +128,7 @@ def _given(result: Made) -> tuple[Array, float, Numbers, Numbers]:
 def test_noise_alone_has_no_curve() -> None:
     rng = np.random.default_rng(5)
     for rows in (60, 300, 1000):
-        estimate = curve_variances(*_given(synthetic(rows, 3, np.zeros(3 * 120), rng)))
+        estimate = curve_variances(*_inputs(synthetic(rows, 3, np.zeros(3 * 120), rng)))
         assert not estimate.variance.any()
         assert estimate.gains == {}
         assert estimate.noise == pytest.approx(1.0, abs=0.4)
@@ -137,7 +137,7 @@ def test_noise_alone_has_no_curve() -> None:
 def test_a_line_stands_out_and_what_is_beside_it_is_shrunk() -> None:
     truth = np.zeros(120)
     truth[2 * 16 : 2 * 17] = 4.0
-    estimate = curve_variances(*_given(synthetic(400, 1, truth, np.random.default_rng(6))))
+    estimate = curve_variances(*_inputs(synthetic(400, 1, truth, np.random.default_rng(6))))
     assert estimate.full[32:34].mean() > 1.0
     assert np.delete(estimate.full, [32, 33]).max() < 0.05
     assert estimate.informed[32:34].min() > 0.9
@@ -146,7 +146,7 @@ def test_a_line_stands_out_and_what_is_beside_it_is_shrunk() -> None:
 def test_units_and_the_order_of_the_joints_do_not_matter() -> None:
     result = synthetic(300, 2, np.repeat([1.0, 0.2], 40), np.random.default_rng(7))
     A, F, z, joint, period = result
-    plain = curve_variances(*_given(result))
+    plain = curve_variances(*_inputs(result))
     swapped = np.r_[40:80, 0:40]
     other = curve_variances(moments_of(A, 1e3 * F[:, swapped], z), len(z), 1 - joint[swapped], period)
     assert_allclose(1e6 * other.variance, plain.variance[swapped], rtol=1e-4, atol=1e-12)
@@ -154,13 +154,13 @@ def test_units_and_the_order_of_the_joints_do_not_matter() -> None:
 
 def test_a_joint_that_readings_do_not_see_has_no_curve() -> None:
     A, F, z, joint, period = synthetic(400, 2, np.repeat([1.0, 4.0], 40), np.random.default_rng(8))
-    every = curve_variances(*_given((A, F, z, joint, period)), most=1000.0)
+    every = curve_variances(*_inputs((A, F, z, joint, period)), most=1000.0)
     assert set(every.gains) == {0, 1}
-    seen = curve_variances(*_given((A, F, z, joint, period)), most=80.0)  # the second has 160
+    seen = curve_variances(*_inputs((A, F, z, joint, period)), most=80.0)  # the second has 160
     assert set(seen.gains) == {0}
     assert not seen.full[joint == 1].any()
     small = np.where(joint == 1, 1e-4, 1.0)  # the noise seems to be a curve of 1e4 times the size
-    assert set(curve_variances(*_given((A, F * small, z, joint, period)), most=1000.0).gains) == {0}
+    assert set(curve_variances(*_inputs((A, F * small, z, joint, period)), most=1000.0).gains) == {0}
 
 
 # -- twins

@@ -194,13 +194,13 @@ def test_a_fit_in_portions_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     data = readings()
     whole = {name: identify(IRB120, data, MODEL[name]) for name in ("geometric", "elastic")}
     monkeypatch.setattr(problem, "_AT_ONCE", 3000)
-    for kept in (True, False):
-        if not kept:
-            monkeypatch.setattr(likelihood, "_KEPT", 0)
+    for stored in (True, False):
+        if not stored:
+            monkeypatch.setattr(likelihood, "_MOST_STORED", 0)
             monkeypatch.setattr(likelihood, "_AT_ONCE", 1000)
-        for name, one in whole.items():
-            assert one.joint_error.any()
-            same_fit(one, identify(IRB120, data, MODEL[name]))
+        for name, value in whole.items():
+            assert value.joint_error.any()
+            same_fit(value, identify(IRB120, data, MODEL[name]))
 
 
 def test_what_is_known_of_fixtures_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,8 +217,8 @@ def test_portions_hold_every_equation_once(monkeypatch: pytest.MonkeyPatch) -> N
     robot = truth_twin(IRB120, "tracker-triangular", np.random.default_rng(5)).robot
     noise = {"position": 1e-4}
     whole = Problem(robot, drawn, MODEL["geometric"].free(robot), noise)
-    here = whole.at(whole.free.start)
-    r, J, G = here.residual, here.jacobian, here.by_joints
+    evaluation = whole.at(whole.free.start)
+    r, J, G = evaluation.residual, evaluation.jacobian, evaluation.by_joints
     monkeypatch.setattr(problem, "_AT_ONCE", 2000)
     parted = replace(whole).at(whole.free.start)
     parts = [*parted.portions()]

@@ -208,8 +208,8 @@ def test_exports_carry_balancers(tmp_path: Path) -> None:
     assert "(1, (" in path.read_text()
     assert any("cannot hold balancers; left out: spring" in words for words in exported(robot, "urdf").left_out)
     assert not any("balancers" in words for words in exported(robot, "python").left_out)
-    (held,) = json.loads(exported(robot, "json").text)["balancers"]
-    assert (held["name"], held["fixed"]["link"], held["stiffness"]) == ("spring", 1, 40e3)
+    (entry,) = json.loads(exported(robot, "json").text)["balancers"]
+    assert (entry["name"], entry["fixed"]["link"], entry["stiffness"]) == ("spring", 1, 40e3)
 
 
 @pytest.mark.parametrize(

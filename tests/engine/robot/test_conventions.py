@@ -121,16 +121,16 @@ def test_zero_reference_holds_its_axes_by_any_of_their_points() -> None:
     axes = [np.array(random_unit(rng, 3)) for _ in BOTH]
     points = [rng.uniform(-1, 1, 3) for _ in BOTH]
     q = rng.uniform(-1, 1, (5, 2))
-    found = []
+    poses = []
     for along in (0.0, 0.7):
         rows = [
             dict(zip(("axis_x", "axis_y", "axis_z", "x", "y", "z"), map(float, (*u, *(p + along * u))), strict=True))
             for u, p in zip(axes, points, strict=True)
         ]
         robot = robot_of("zero-reference", rows, BOTH)
-        found.append(robot.world_poses(q))
+        poses.append(robot.world_poses(q))
         assert_allclose(robot.world_poses(np.zeros((1, 2)))[0], 0.0, rtol=0, atol=1e-15)
-    for first, other in zip(*found, strict=True):
+    for first, other in zip(*poses, strict=True):
         assert_allclose(first, other, rtol=0, atol=1e-14)
 
 

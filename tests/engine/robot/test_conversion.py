@@ -37,13 +37,13 @@ def check_same(result: Robot, robot: Robot, rng: np.random.Generator) -> None:
 
 def centres(robot: Robot, q: Array) -> Array:
     """Centres of gravity of the links in the world, ``(masses, n, 3)``."""
-    found = []
+    points = []
     for mass in robot.masses:
         links = Chain((*robot.base_elements, *(e for link in robot.link_elements[: mass.joint] for e in link)))
         kinematics = links.forward_kinematics(robot.variables(q, robot.values), robot.values)
         centre = robot.axial_slides.stayed(mass.joint, mass.cog, robot.values)
-        found.append(kinematics.matrix() @ centre + kinematics.position.T)
-    return np.array(found)
+        points.append(kinematics.matrix() @ centre + kinematics.position.T)
+    return np.array(points)
 
 
 def loads_along_axes(robot: Robot, q: Array) -> Array:

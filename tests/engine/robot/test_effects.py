@@ -96,13 +96,13 @@ def test_derivatives_are_central_differences_under_load(effect: type[Effect]) ->
     robot = loaded_arm((effect.name,), 3)
     at = robot.loaded(circumstances(robot, 40, 4))
     names = [p.name for e in robot.effects for p in e.parameters]
-    here = robot.forward_kinematics(at, "tip")
-    linear, angular = robot.jacobians(here, at, names)
+    kinematics = robot.forward_kinematics(at, "tip")
+    linear, angular = robot.jacobians(kinematics, at, names)
     for i, name in enumerate(names):
         h = 1e-3 * robot.parameters[name].prior
         values = ({**robot.values, name: robot.values[name] + step} for step in (h, -h))
         ahead, behind = (robot.forward_kinematics(at, "tip", trial) for trial in values)
-        turned = (ahead.matrix() - behind.matrix()) @ np.swapaxes(here.matrix(), 1, 2)
+        turned = (ahead.matrix() - behind.matrix()) @ np.swapaxes(kinematics.matrix(), 1, 2)
         vee = np.stack([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]])
         for own, moved in ((linear[i], ahead.position - behind.position), (angular[i], vee)):
             atol = 1e-6 * np.abs(own).max() + 1e-13 / h
@@ -374,9 +374,9 @@ def test_the_sum_is_that_of_parameters_times_shapes() -> None:
     moved = effect.deflection(at, trials)
     assert sorted(moved) == [0, 1, 4]
     for number in range(3):
-        one = effect.deflection(at, {name: float(value[number, 0]) for name, value in trials.items()})
+        deflection = effect.deflection(at, {name: float(value[number, 0]) for name, value in trials.items()})
         for joint, part in moved.items():
-            assert_allclose(part[number], one[joint], rtol=0, atol=1e-15)
+            assert_allclose(part[number], deflection[joint], rtol=0, atol=1e-15)
 
 
 def test_forward_of_inverse_is_the_pose() -> None:
@@ -394,8 +394,8 @@ def test_forward_of_inverse_is_the_pose() -> None:
 
 def test_a_file_holds_a_curve_in_a_few_lines(tmp_path: Path) -> None:
     robot = curved(5)
-    one = replace(robot.parameters["curve_sin7_5"], nominal=1e-6)
-    for given_robot in (robot, robot.with_parameters([one])):
+    coefficient = replace(robot.parameters["curve_sin7_5"], nominal=1e-6)
+    for given_robot in (robot, robot.with_parameters([coefficient])):
         text = robot_text(given_robot)
         path = tmp_path / "robot.yaml"
         path.write_text(text)

@@ -83,12 +83,12 @@ def test_forward_of_inverse_is_the_pose_on_the_branch_asked_for(name: str) -> No
         for k in np.unique(number):
             chosen = number == k
             solution = inverse(robot, p[chosen], R[chosen], frame="world", branch=BRANCHES[k])
-            there = np.array([status.usable for status in solution.status])
-            for row in np.flatnonzero(~there):
+            usable = np.array([status.usable for status in solution.status])
+            for row in np.flatnonzero(~usable):
                 assert solution.status[row] is PoseStatus.BEYOND_LIMIT
                 assert solution.singular_value[row] < 0.05
-            assert {solution.branch[row] for row in np.flatnonzero(there)} == {BRANCHES[k]}
-            errors = pose_errors(robot, solution.joints[there], p[chosen][there], R[chosen][there])
+            assert {solution.branch[row] for row in np.flatnonzero(usable)} == {BRANCHES[k]}
+            errors = pose_errors(robot, solution.joints[usable], p[chosen][usable], R[chosen][usable])
             assert max(errors) < 1e-9, (gain, BRANCHES[k])
 
 

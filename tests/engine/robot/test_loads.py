@@ -119,12 +119,12 @@ def by_pinocchio(robot: Robot, variables: Array, velocity: Array, acceleration: 
     lever = [bearing_of(elements, elements.index(e), robot) * np.array(axis_of(e)) for e in joints]
     loads = np.empty((len(joints), 6, variables.shape[1]))
     for k in range(variables.shape[1]):
-        held = oracle.reactions(
+        reactions = oracle.reactions(
             variables[:, k], velocity[:, k], acceleration[:, k], np.array(robot.gravity), wrench[:, k]
         )
         for i, axes in enumerate(own_axes):
-            moment = held[i, 3:] - np.cross(lever[i], held[i, :3])
-            loads[i, :3, k], loads[i, 3:, k] = -axes @ held[i, :3], -axes @ moment
+            moment = reactions[i, 3:] - np.cross(lever[i], reactions[i, :3])
+            loads[i, :3, k], loads[i, 3:, k] = -axes @ reactions[i, :3], -axes @ moment
     return loads
 
 
@@ -133,8 +133,8 @@ def compare_with_pinocchio(robot: Robot, rng: np.random.Generator) -> None:
     still, none = np.zeros_like(velocity), np.zeros_like(wrench)
     for v, a, w in ((None, None, None), (None, None, wrench), (velocity, acceleration, None), (velocity, None, wrench)):
         actual = joint_loads(robot, variables, velocity=v, acceleration=a, wrench=w)
-        given = (rest if values is None else values for values, rest in ((v, still), (a, still), (w, none)))
-        expected = by_pinocchio(robot, variables, *given)
+        inputs = (default if values is None else values for values, default in ((v, still), (a, still), (w, none)))
+        expected = by_pinocchio(robot, variables, *inputs)
         for part in (slice(0, 3), slice(3, 6)):
             size = np.abs(expected[:, part]).max()
             assert size > 0.1
@@ -183,8 +183,8 @@ def test_level_arm_sags_forward() -> None:
     assert_allclose(loads[0, :2], weight * np.array([np.sin(q[0]), np.cos(q[0])]), rtol=0, atol=1e-14)
     assert_allclose(loads[0, 2:5], 0.0, rtol=0, atol=1e-14)
     assert loads[0, 5, 0] > 0  # turning forward, about y of the base, lowers the arm
-    held, sagged = (lever().world_poses(np.array([[turn]]))[0][0, 2] for turn in (0.0, 1e-4 * loads[0, 5, 0]))
-    assert sagged < held
+    straight, sagged = (lever().world_poses(np.array([[turn]]))[0][0, 2] for turn in (0.0, 1e-4 * loads[0, 5, 0]))
+    assert sagged < straight
 
 
 def test_weight_beside_the_plane_of_an_arm_twists_its_bearing() -> None:

@@ -51,7 +51,7 @@ def written(folder: Path, text: str, name: str = "calibration.conf") -> Path:
     return path
 
 
-def made(folder: Path, text: str, robot: str) -> Robot:
+def arm_of(folder: Path, text: str, robot: str) -> Robot:
     return with_kinematics(load_robot(robot), read_kinematics(written(folder, text)))
 
 
@@ -66,10 +66,10 @@ PUBLISHED = ((ur.UR10_CONF, "ur10"), (ur.UR3E_CONF, "ur3e"), (ur10e_conf(), "ur1
 def test_poses_are_those_of_the_controllers_table_and_frames_lie_beside_the_nominal_ones(tmp_path: Path) -> None:
     # Three arms as they were published, with d up to 446 m.
     for conf, robot in PUBLISHED:
-        arm, type_ = made(tmp_path, conf, robot), load_robot(robot)
+        arm, type_ = arm_of(tmp_path, conf, robot), load_robot(robot)
         expected = ur.forward(ur.table(robot, conf), JOINTS)
-        for one in (arm, controller_robot(arm)):
-            positions, rotations = one.world_poses(JOINTS)
+        for model in (arm, controller_robot(arm)):
+            positions, rotations = model.world_poses(JOINTS)
             assert_allclose(positions, expected[:, :3, 3], rtol=0, atol=1e-9, err_msg=robot)
             assert_allclose(rotations, expected[:, :3, :3], rtol=0, atol=1e-9, err_msg=robot)
         for unit, most in (("m", 2e-3), ("rad", 0.01)):
@@ -81,10 +81,10 @@ def test_poses_are_those_of_the_controllers_table_and_frames_lie_beside_the_nomi
 def test_a_file_of_another_type_or_kind_is_refused(tmp_path: Path) -> None:
     for conf, robot in ((ur.UR10_CONF, "ur5e"), (ur.UR3E_CONF, "ur5"), (ur10e_conf(), "ur3e")):
         with refused("another type of robot; got 'a flange ", " mm from that of ur", "allowed: 20 mm", of=robot):
-            refuse_far(made(tmp_path, conf, robot), load_robot(robot), "calibration.conf")
+            refuse_far(arm_of(tmp_path, conf, robot), load_robot(robot), "calibration.conf")
     for robot in ("irb120", "li3", "kr5"):
         with pytest.raises(InputError, match=r"another kind is given|must have the table and the frames"):
-            made(tmp_path, ur.UR10_CONF, robot)
+            arm_of(tmp_path, ur.UR10_CONF, robot)
     for robot in ("irb120", "li3", "katana450"):
         with refused("no arm of the kind that the format describes", of=robot):
             exported(load_robot(robot), "ur-kinematics")
@@ -102,7 +102,7 @@ def test_angles_of_the_ros_driver_are_read_in_the_order_in_which_it_writes_them(
 
 
 def test_what_is_exported_is_read_again(tmp_path: Path) -> None:
-    arm = made(tmp_path, ur.UR10_CONF, "ur10")
+    arm = arm_of(tmp_path, ur.UR10_CONF, "ur10")
     export = exported(arm, "ur-kinematics")
     again = with_kinematics(load_robot("ur10"), read_kinematics(written(tmp_path, export.text, "ros.yaml")))
     for first, other in zip(again.world_poses(JOINTS), arm.world_poses(JOINTS), strict=True):
@@ -192,7 +192,7 @@ def test_a_flange_that_is_turned_far_is_refused(tmp_path: Path) -> None:
     type_ = load_robot("ur10")
     theta, a, d, alpha = ur.deltas(ur.UR10_CONF)
     zeros = (theta + np.array([0, 0, 0, 0, 0, angle]) for angle in (0.0, 0.09))  # of joint 6, which moves no flange
-    plain, turned = (made(tmp_path, ur.conf_of(zero, a, d, alpha), "ur10") for zero in zeros)
+    plain, turned = (arm_of(tmp_path, ur.conf_of(zero, a, d, alpha), "ur10") for zero in zeros)
     assert mean_distance(turned, type_) == pytest.approx(mean_distance(plain, type_))
     assert np.degrees(mean_angle(plain, type_)) == pytest.approx(0.362, abs=1e-3)
     assert np.degrees(mean_angle(turned, type_)) == pytest.approx(np.degrees(0.09), abs=0.1)
@@ -238,14 +238,14 @@ def test_a_frame_far_from_the_types_is_refused(tmp_path: Path) -> None:
     )
     odd = read_robot(written(tmp_path, text, "odd.yaml"))
     assert_allclose(odd.world_poses(JOINTS)[0], load_robot("ur10").world_poses(JOINTS)[0], atol=1e-9)
-    text = exported(made(tmp_path, ur.UR10_CONF, "ur10"), "ur-kinematics").text
+    text = exported(arm_of(tmp_path, ur.UR10_CONF, "ur10"), "ur-kinematics").text
     arm = with_kinematics(odd, read_kinematics(written(tmp_path, text, "ros.yaml")))
     with pytest.raises(InputError, match="does not come to lie beside the nominal one"):
         refuse_far(arm, odd, "ros.yaml")
 
 
 def test_a_robot_file_holds_what_the_controller_computes_with(tmp_path: Path) -> None:
-    arm = made(tmp_path, ur.UR10_CONF, "ur10")
+    arm = arm_of(tmp_path, ur.UR10_CONF, "ur10")
     again = read_robot(written(tmp_path, robot_text(arm), "arm.yaml"))
     assert robot_text(again) == robot_text(arm)
     assert again.controller.kinematics.kind == "own"
@@ -295,7 +295,7 @@ def test_kinematics_that_nobody_can_read_are_refused(entry: str, said: str, tmp_
 
 def test_rows_of_another_arm_in_a_robot_file_are_refused(tmp_path: Path) -> None:
     yaml = YAML(typ="safe")
-    text = robot_text(made(tmp_path, ur.UR10_CONF, "ur10"))
+    text = robot_text(arm_of(tmp_path, ur.UR10_CONF, "ur10"))
     for row, column, wrong, words in (
         (1, "a", 60.0, "another type of robot"),
         (5, "theta_offset", 5.0, "no arm of this type"),

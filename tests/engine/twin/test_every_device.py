@@ -65,21 +65,22 @@ def residuals(twin: Twin, data: Dataset) -> Array:
     tips = np.array([frames[data.targets[t]][c, :3, 3] for c, t in zip(data.configuration, data.target, strict=True)])
     off = []
     for index in np.unique(data.against).tolist():
-        mine = data.against == index
-        at, read = tips[mine], data.position[mine]
+        of_fixture = data.against == index
+        at, read = tips[of_fixture], data.position[of_fixture]
         if data.height is not None:
             Vt = np.linalg.svd(at - at.mean(axis=0))[2]
-            off.append((at - at.mean(axis=0)) @ Vt[2] - data.height[mine])
+            off.append((at - at.mean(axis=0)) @ Vt[2] - data.height[of_fixture])
         elif data.distance is not None:
             rows = np.column_stack([2 * (at - at.mean(axis=0)), np.ones(len(at))])
-            right = ((at - at.mean(axis=0)) ** 2).sum(axis=1) - data.distance[mine] ** 2
+            right = ((at - at.mean(axis=0)) ** 2).sum(axis=1) - data.distance[of_fixture] ** 2
             centre = at.mean(axis=0) + np.linalg.lstsq(rows, right, rcond=None)[0][:3]
             for _ in range(5):
                 far = np.linalg.norm(at - centre, axis=1)
                 centre = (
-                    centre + np.linalg.lstsq((centre - at) / far[:, None], data.distance[mine] - far, rcond=None)[0]
+                    centre
+                    + np.linalg.lstsq((centre - at) / far[:, None], data.distance[of_fixture] - far, rcond=None)[0]
                 )
-            off.append(data.distance[mine] - np.linalg.norm(at - centre, axis=1))
+            off.append(data.distance[of_fixture] - np.linalg.norm(at - centre, axis=1))
         elif index < 0:
             off.append((read - at).ravel())
         else:
@@ -344,11 +345,11 @@ def covered(name: str) -> tuple[int, int]:
 
 def test_stated_intervals_hold_the_truth_as_often_as_they_say() -> None:
     """Over all devices: 300 parameters of 19 robots; those of one robot go together, so 4 % either way is chance."""
-    found = {name: covered(name) for name in NAMES}
-    for name, (within, counted) in found.items():
+    coverage = {name: covered(name) for name in NAMES}
+    for name, (within, counted) in coverage.items():
         assert counted > 12, name
         assert within >= 0.75 * counted, name
-    within, counted = np.sum(list(found.values()), axis=0).tolist()
+    within, counted = np.sum(list(coverage.values()), axis=0).tolist()
     assert counted > 230
     assert 0.91 <= within / counted <= 0.99
 

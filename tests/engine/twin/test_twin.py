@@ -253,7 +253,7 @@ CLEARANCE = (0.022, 0.024, 0.017, 0.015, 0.018)  # Table 4.3 [deg]
 def katana_on_the_circle() -> tuple[Robot, Array]:
     """Return the arm with the pencil and joints on the circle of section 5.5.1, each point from the same posture."""
     robot = load_robot("katana450").with_frames(Transform(), {"tip": (0.0, 0.0, 0.130)})
-    centre, found = np.array([0.0, -0.3, 0.1392893]), []
+    centre, postures = np.array([0.0, -0.3, 0.1392893]), []
     for angle in np.linspace(0, 2 * math.pi, 24, endpoint=False):
         up, across = 0.1 * math.cos(angle) * math.sqrt(0.5), 0.1 * math.sin(angle)
         point, q = centre + np.array([across, -up, up]), np.radians([0.0, 30.0, 60.0, 60.0, 0.0])
@@ -265,8 +265,8 @@ def katana_on_the_circle() -> tuple[Robot, Array]:
             q = q + step * min(1.0, 0.2 / float(np.abs(step).max()))
         else:
             raise AssertionError("a point of the circle cannot be reached")
-        found.append(q)
-    return robot, np.array(found)
+        postures.append(q)
+    return robot, np.array(postures)
 
 
 def test_the_katana_on_its_circle_is_as_far_off_as_the_document_measured() -> None:

@@ -151,8 +151,8 @@ def its_truths_are_near(robot: Robot) -> None:
 def test_titles_are_unlike_and_invented_numbers_say_so() -> None:
     robots = [load_robot(robot_id) for robot_id in library()]
     assert len({robot.title for robot in robots}) == len(robots)
-    told = (load_robot("li3").source, load_robot("li3").title, load_robot("lrmate200ic").truths["invented"].source)
-    assert all("invented" in text.lower() for text in told)
+    texts = (load_robot("li3").source, load_robot("li3").title, load_robot("lrmate200ic").truths["invented"].source)
+    assert all("invented" in text.lower() for text in texts)
 
 
 def test_every_arm_is_held_against_something_outside() -> None:

@@ -247,8 +247,8 @@ def calibrated(asked: Calibrate) -> Calibration:
     read = _read(asked, zones)
     with refusals_of("data"):
         parts = _split(asked, read)
-        identified = _identified(asked, read, parts)
-    calibration = replace(_judged(asked, read, parts, identified), inputs=inputs)
+        solved = _identified(asked, read, parts)
+    calibration = replace(_judged(asked, read, parts, solved), inputs=inputs)
     if asked.out is not None:
         calibration.save(asked.out, asked.progress, replace=asked.replace)
     return calibration
@@ -356,15 +356,15 @@ def _identified(asked: Calibrate, read: _Read, parts: _Parts) -> _Identified:
     return _Identified(robot, placed, model, fit, selection, tuple(contradicted), tuple(notices))
 
 
-def _judged(asked: Calibrate, read: _Read, parts: _Parts, identified: _Identified) -> Calibration:
+def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -> Calibration:
     """Judge what was identified by the part that it has not seen."""
     asked.progress("judging it")
-    fit, first, second = identified.fit, parts.first, parts.second
+    fit, first, second = solved.fit, parts.first, parts.second
     validation = None if second is None else errors_of(fit.robot, second)
     train_errors = errors_of(fit.robot, first)
     of_split = (
-        *identified.contradicted,
-        *_beside_nominal(identified.placed, fit, first, second, parts.noticed, read.fixed),
+        *solved.contradicted,
+        *_beside_nominal(solved.placed, fit, first, second, parts.noticed, read.fixed),
         *check_excluded(
             parts.excluded,
             fit.robot,
@@ -374,14 +374,14 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, identified: _Identifie
         ),
         *check_copies(parts.readings, parts.training, parts.held_out),
         *check_trained_before(
-            identified.robot,
+            solved.robot,
             read.as_read,
             read.sha256,
             (len(parts.training), parts.readings.configurations, asked.seed),
             without_words(asked.without),
         ),
         *parts.moved,
-        *identified.notices,
+        *solved.notices,
     )
     diagnosis = diagnose(
         Case(
@@ -410,17 +410,11 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, identified: _Identifie
         asked.progress("identifying zones")
         bounds = read.options["bounds"]
         zones = choose_zones(
-            read.zones,
-            identified.robot,
-            fit,
-            (first, second),
-            loss=asked.loss,
-            redundancy=asked.redundancy,
-            bounds=bounds,
+            read.zones, solved.robot, fit, (first, second), loss=asked.loss, redundancy=asked.redundancy, bounds=bounds
         )
     return Calibration(
         fit=fit,
-        nominal=errors_of(identified.placed, parts.judges),
+        nominal=errors_of(solved.placed, parts.judges),
         train=train_errors,
         validation=validation,
         expected=diagnosis.expected,
@@ -430,10 +424,10 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, identified: _Identifie
         training=parts.training,
         held_out=parts.held_out,
         command=asked.again,
-        history=_history(asked, read, parts, identified),
+        history=_history(asked, read, parts, solved),
         urdf=read.urdf,
-        selection=identified.selection,
-        known_before=_known_before(identified.robot),
+        selection=solved.selection,
+        known_before=_known_before(solved.robot),
         without=tuple(asked.without),
         excluded=parts.excluded,
         notes=dict(asked.notes or {}),
@@ -442,11 +436,11 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, identified: _Identifie
     )
 
 
-def _history(asked: Calibrate, read: _Read, parts: _Parts, identified: _Identified) -> str:
+def _history(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -> str:
     """Return what was done, in one line with the hash of the data."""
     by_file = "" if read.sha256 is None else f"sha256 {read.sha256[:12]}, "
     digest = f" ({by_file}readings {readings_digest(read.as_read)[:12]})"
-    freed = " + ".join([identified.model.name, *(name for name in asked.effects if name in identified.model.effects)])
+    freed = " + ".join([solved.model.name, *(name for name in asked.effects if name in solved.model.effects)])
     return (
         f"calibrated by truearm {__version__}: model {freed},"
         f" {len(parts.training)} of {parts.readings.configurations} configurations of"

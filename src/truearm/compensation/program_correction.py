@@ -150,14 +150,11 @@ def corrected_programs(
     if robot.proof is not None and arm_is_known(robot):
         progress("judging the targets")
         shared = names if choice.was_taught("frames") else ()
-        reached = [
-            program.reached(correction, flange, shared)
-            for program, correction in zip(resolved, corrections, strict=True)
-        ]
+        reached = [program.reached(moved, flange, shared) for program, moved in zip(resolved, corrections, strict=True)]
         expected = expected_errors(robot, robot.proof, reached, frames, taught_tools=choice.was_taught("tools"))
         corrections = [
-            program.judged(correction, of_targets, every=choice.every)
-            for program, correction, of_targets in zip(resolved, corrections, expected, strict=True)
+            program.judged(moved, of_targets, every=choice.every)
+            for program, moved, of_targets in zip(resolved, corrections, expected, strict=True)
         ]
     return CorrectedPrograms(
         tuple(corrections),
@@ -168,11 +165,7 @@ def corrected_programs(
         choice,
         loads,
         {name: apart for program in resolved for name, apart in program.tools_apart(agreed).items()},
-        tuple(
-            case
-            for program, correction in zip(resolved, corrections, strict=True)
-            for case in program.pushed(correction)
-        ),
+        tuple(case for program, moved in zip(resolved, corrections, strict=True) for case in program.pushed(moved)),
     )
 
 

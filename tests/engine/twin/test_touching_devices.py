@@ -85,8 +85,8 @@ def test_any_arm_touches_though_it_errs_sags_and_plays(name: str) -> None:
     )
     data = table.tilted(ROLL, -PITCH).touched_by(twin, start, 0.0, rng)
     assert data.approach is not None
-    there = tips(twin, data.joints, data.approach)
-    np.testing.assert_allclose(there, table.tilted(ROLL, -PITCH).in_world, atol=2e-10)
+    touched = tips(twin, data.joints, data.approach)
+    np.testing.assert_allclose(touched, table.tilted(ROLL, -PITCH).in_world, atol=2e-10)
     np.testing.assert_array_equal(data.position, table.points)
     assert data.sigma is None
 
@@ -98,8 +98,8 @@ def test_play_lies_as_the_order_of_points_says_or_as_told() -> None:
     perfect = table.touched_by(Twin(arm()), ELBOW_UP, 0.0, rng).joints
     in_order = table.touched_by(twin, ELBOW_UP, 0.0, rng)
     np.testing.assert_allclose(in_order.joints, perfect - play * directions(perfect), atol=1e-8)
-    told = table.touched_by(twin, ELBOW_UP, 0.0, rng, approach=np.ones(perfect.shape))
-    np.testing.assert_allclose(told.joints, perfect - play, atol=1e-8)
+    stated = table.touched_by(twin, ELBOW_UP, 0.0, rng, approach=np.ones(perfect.shape))
+    np.testing.assert_allclose(stated.joints, perfect - play, atol=1e-8)
 
 
 def test_noise_is_where_the_tip_is_and_is_declared() -> None:

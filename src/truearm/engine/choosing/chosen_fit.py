@@ -12,7 +12,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.thinning import JUDGED_IN_PART
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Fit, Status, identify
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.rounds import Redundant
 from truearm.engine.robot.robot import Robot
@@ -30,7 +30,7 @@ def identify_chosen(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
-    held: Held = NOTHING_HELD,
+    held: FixedPlaces = NOTHING_FIXED,
     bootstrap: int = 0,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
@@ -59,7 +59,7 @@ def identify_chosen(
             redundancy=redundancy,
             bounds=bounds,
             bounds_file=bounds_file,
-            held=held,
+            fixed=held,
             bootstrap=bootstrap,
             seed=seed,
             progress=progress,

@@ -128,12 +128,12 @@ def diagnose(case: Case) -> Diagnosis:
 
 def _in_part(left: LeftOver) -> list[Notice]:
     """Say if what the fit leaves was looked at in part of the configurations alone."""
-    if len(left.chosen) == left.given.configurations:
+    if len(left.chosen) == left.asked.configurations:
         return []
     return [
         JUDGED_IN_PART(
             f"The data are large for so many parameters: what the fit leaves was looked at in {len(left.chosen)} of "
-            f"{counted(left.given.configurations, 'configuration')}, evenly spaced. What is off or changed at others "
+            f"{counted(left.asked.configurations, 'configuration')}, evenly spaced. What is off or changed at others "
             "alone is not told. Parameters and errors are those of all configurations."
         )
     ]

@@ -76,9 +76,9 @@ def flange_fixed(robot: Robot) -> bool:
 
 def fixed_by(fit: Fit) -> tuple[str, ...]:
     """Return how a proof says what a fit has held."""
-    fixed = fit.held.names(fit.robot)
-    targets = [name for name in fixed if fit.robot.parameters[name].group == "target"]
-    names = [BASE] if fit.held.base is not None else []
+    held = fit.fixed.names(fit.robot)
+    targets = [name for name in held if fit.robot.parameters[name].group == "target"]
+    names = [BASE] if fit.fixed.base is not None else []
     if not _freedom_beside(fit.robot, targets).shape[1]:
         names.append(FLANGE)
     return (*names, *targets)

@@ -199,11 +199,11 @@ class RobotData:
     @cached_property
     def offset_elements(self) -> Mapping[str, tuple[tuple[int, float], ...]]:
         """The elements of the trunk that follow a parameter of another one, by its name, with their factors."""
-        found: dict[str, tuple[tuple[int, float], ...]] = {}
+        elements: dict[str, tuple[tuple[int, float], ...]] = {}
         for place, element in enumerate(self.trunk.elements):
             for name, factor, _ in element.offsets:
-                found[name] = (*found.get(name, ()), (place, factor))
-        return found
+                elements[name] = (*elements.get(name, ()), (place, factor))
+        return elements
 
     @cached_property
     def layout(self) -> Layout:

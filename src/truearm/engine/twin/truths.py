@@ -124,7 +124,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         gear = (periods or 0, of("transmission_sin", number), of("transmission_cos", number))
         return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, *curve, gear) if s or c)
 
-    made = {
+    truths = {
         number: JointTruth(
             compliance=of("compliance", number),
             quadratic=of("compliance_quadratic", number),
@@ -148,7 +148,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
             came=unknown[0],
             cure="Take it out of the robot file; a simulation would leave it out without a word.",
         )
-    return made
+    return truths
 
 
 def _contact(robot: Robot) -> Contact:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, Self
@@ -379,19 +379,21 @@ def expected_variances(of: CurveMoments, likeliest: Array) -> Array:
     return np.asarray(expected)
 
 
-def curve_covariance(of: CurveMoments, variance: Array, certain: NDArray[np.bool_]) -> tuple[Array, Array]:
+def curve_covariance(
+    of: CurveMoments, variance: Array, certain: NDArray[np.bool_], expected: Array
+) -> tuple[Array, Array]:
     """Return the mean squared error of the fitted values, its part without readings, and which coefficients matter.
 
     Args:
         variance: Of each coefficient [rad^2].
+        expected: What the variance of each of the others is expected to be, by its prior's, ``(others,)``.
         certain: Which of all parameters cannot be off, ``(others + coefficients,)``.
 
     Returns:
         whole, beforehand: ``(parameters, parameters)`` each: the others per prior, coefficients in rad. The second is
             what priors leave, without the noise of the readings.
     """
-    others = len(of.away) - len(variance)
-    expected = np.concatenate([np.ones(others), np.maximum(variance, _CERTAIN)])
+    expected = np.concatenate([expected, np.maximum(variance, _CERTAIN)])
     root = np.where(certain, 0.0, np.sqrt(expected))
     H = root[:, None] * of.moments[:-1, :-1] * root
     C = np.linalg.inv(H + np.eye(len(root)))
@@ -619,6 +621,7 @@ def parts_with_curves(
     weight: Array,
     certain: NDArray[np.bool_],
     scatter: CovariancePart | None,
+    expected_of: Callable[[CurveMoments, Array, Sequence[str]], Array],
 ) -> tuple[tuple[str, ...], tuple[CovariancePart, ...]]:
     """Return what the parameters of a fit with curves are off by, and the coefficients that were not fitted.
 
@@ -629,6 +632,7 @@ def parts_with_curves(
         certain: Which of its free parameters are certain, ``(free,)``.
         scatter: What the readings' noise adds to the covariance of the free parameters [SI], where it follows from
             their scatter.
+        expected_of: What the variances of the other parameters are expected to be, by their priors'.
 
     Returns:
         names, parts: Of the coefficients that are zero in the fit and may not be, and the parts of the covariance [SI]
@@ -636,14 +640,15 @@ def parts_with_curves(
     """
     names, free = list(curves.places), problem.free
     of = curve_moments(problem, curves, joints, weight, 1.0 if scatter is None else curves.design_effect)
-    variance = expected_variances(of, curves.likeliest)
+    variance = expected_variances(of, curves.likeliest) if names else np.zeros(0)
     others = [p for p in free.parameters if p.name not in curves.places]
     place = {name: k for k, name in enumerate((*(p.name for p in others), *names))}
     sure = np.zeros(len(place), dtype=bool)
     sure[[place[name] for name, is_certain in zip(free.names, certain.tolist(), strict=True) if is_certain]] = True
-    whole, beforehand = curve_covariance(of, variance, sure)
+    expected = expected_of(of, variance, [p.name for p in others])
+    whole, beforehand = curve_covariance(of, variance, sure, expected)
     fitted = set(free.names)
-    more = [name for name, on in zip(names, that_matter(of, variance).tolist(), strict=True) if on]
+    more = [name for name, on in zip(names, that_matter(of, variance).tolist(), strict=True) if on] if names else []
     more = [name for name in more if name not in fitted]
     order = [place[name] for name in (*free.names, *more)]
     size = np.concatenate([[p.prior for p in others], np.ones(len(names))])[order]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ from truearm.engine.fit.problem import (
     in_words,
     unobservable_parameters,
 )
+from truearm.engine.fit.relevance import expected_sizes
 from truearm.engine.fit.rounds import (
     Redundant,
     Solved,
@@ -310,7 +312,8 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     robot = in_the_middle(start.with_parameters(identified), problem.data)
     dropped = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     # What is expected of curves is found from the data, and their deviations say where nothing else is known.
-    looked_at = FreeParameters((*(robot.parameters[n] for n in free.names if n not in solved.curves.places), *dropped))
+    weighed = {*solved.curves.places, *solved.sizes.place}
+    looked_at = FreeParameters((*(robot.parameters[n] for n in free.names if n not in weighed), *dropped))
     unobservable = unobservable_parameters(robot, problem.data, looked_at, fixed=solved.fixed)
     unobservable = tuple(dict.fromkeys((*unobservable, *open_)))
     gauge = gauge_freedoms(problem.data, solved.fixed)
@@ -392,7 +395,7 @@ def _worth(
         of_bounds = np.clip(1.0 - (deviation / np.where(bounded, evenly, 1.0)) ** 2, 0.0, 1.0)
         informed = np.where(bounded, np.minimum(informed, of_bounds), informed)
     parts, unfitted = tuple(part.scaled(free.prior) for part in parts), tuple[str, ...]()
-    if solved.curves.variances:
+    if solved.curves.variances or solved.sizes:
         known = dict(zip(free.names, x.tolist(), strict=True))
         at_solution = replace(
             problem,
@@ -401,8 +404,10 @@ def _worth(
         )
         joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
         alone = parts[0] if scattered or draws is not None else None
-        unfitted, parts = parts_with_curves(at_solution, solved.curves, joints, solution.weight, at_bound, alone)
+        unfitted, parts = parts_with_curves(at_solution, solved.curves, joints, solution.weight, at_bound, alone, partial(expected_sizes, solved.sizes))
         covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
+        beforehand = np.array([solved.start.parameters[name].prior for name in free.names])
+        informed = np.clip(1.0 - np.diag(covariance) / beforehand**2, 0.0, 1.0)
     return covariance, parts, informed, unfitted
 
 

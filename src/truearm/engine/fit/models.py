@@ -22,6 +22,7 @@ class Model:
     effects: tuple[str, ...] = ()  #: Joint effects that are added and free.
     #: Joint effects that could have been, had the data said that they help; bounds may name their parameters.
     tried: tuple[str, ...] = ()
+    weighed: bool = False  #: Whether the data tell how large each effect is.
 
     def also(self, effects: Sequence[str]) -> Model:
         """Return the model with some joint effects added."""

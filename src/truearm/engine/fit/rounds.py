@@ -31,6 +31,7 @@ from truearm.engine.fit.problem import (
     find_redundancies,
     gauge_freedoms,
 )
+from truearm.engine.fit.relevance import NO_SIZES, Sizes, priors_beforehand, with_sizes
 from truearm.engine.fit.solver import SMALL, Solution, solve
 from truearm.engine.fit.start_values import start_from_readings, unanchored
 from truearm.engine.fit.variance_components import Components, CovariancePart, beyond_chance, variance_components
@@ -58,6 +59,8 @@ _ROUNDS: Final = 6
 _SETTLED: Final = 0.02  # largest relative change of a deviation that changes nothing
 #: Information of the readings on a direction, by that of the priors, that is none.
 _UNSEEN: Final = 1e-3
+#: Rounds in which the sizes of effects are found before curves of the joints join in.
+_ROUNDS_OF_SIZES: Final = 2
 _LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
 
 
@@ -77,6 +80,7 @@ class Solved:
     components: Components | None
     fixed: FixedPlaces = NOTHING_FIXED  #: Places that were known.
     curves: Curves = NO_CURVES  #: The curves of the joints, where the model has them.
+    sizes: Sizes = NO_SIZES  #: How large the effects are expected to be, where the data tell.
 
     @property
     def robot(self) -> Robot:
@@ -131,8 +135,14 @@ def find_parameters(
             _check_dropped(out, free, check_bounds, bounds_file)
         retained = problem.free.without(out)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, retained)
-        solution, reduced, components, curves = _solve_with_noise(
-            replace(problem, free=retained), loss, limits, small, shared=shared and redundancy != "none", joints=joints
+        solution, reduced, components, curves, sizes = _solve_with_noise(
+            replace(problem, free=retained),
+            loss,
+            limits,
+            small,
+            shared=shared and redundancy != "none",
+            joints=joints,
+            weighed=model.weighed,
         )
         steps += solution.steps
         if redundancy != "drop":
@@ -154,7 +164,7 @@ def find_parameters(
     if reduced.priors and "size" in gauge_freedoms(data, fixed):
         solution = _not_shrunk(reduced, solution, limits)
     start = start.with_parameters(curves.priors_of(start))
-    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, fixed, curves)
+    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, fixed, curves, sizes)
 
 
 def _checked(
@@ -168,14 +178,18 @@ def _checked(
     bounds_file: str,
 ) -> tuple[Array, Array] | None:
     """Refuse what cannot be found; return the lowest and highest value of every free parameter, if there are bounds."""
-    if redundancy != "prior" and JointCurve.name in model.effects:
+    if redundancy != "prior" and (model.weighed or JointCurve.name in model.effects):
         raise InputError(
-            "curves of joints are found with priors, whose size the data tell",
+            "the data tell how large joint effects are, which needs priors"
+            if model.weighed
+            else "curves of joints are found with priors, whose size the data tell",
             parameter="redundancy",
             where=f"model {model.name}",
             came=redundancy,
             allowed="prior",
-            cure=f"Leave out `redundancy`, or the joint effect {JointCurve.name}.",
+            cure="Leave out `redundancy`, or name a model."
+            if model.weighed
+            else f"Leave out `redundancy`, or the joint effect {JointCurve.name}.",
         )
     if not free.names:
         raise InputError(
@@ -271,7 +285,8 @@ def _solve_with_noise(
     *,
     shared: bool,
     joints: Array | None = None,
-) -> tuple[Solution, Problem, Components | None, Curves]:
+    weighed: bool = False,
+) -> tuple[Solution, Problem, Components | None, Curves, Sizes]:
     """Solve; then again with what the solution says of deviations, of the joints' curves and of the loads.
 
     Deviations are estimated where they are not declared. Declared ones are widened where the residuals are larger than
@@ -282,7 +297,9 @@ def _solve_with_noise(
     """
     untold: frozenset[str] = frozenset()
     while True:
-        result = _solve_in_rounds(problem, loss, limits, small, shared=shared, joints=joints, untold=untold)
+        result = _solve_in_rounds(
+            problem, loss, limits, small, shared=shared, joints=joints, untold=untold, weighed=weighed
+        )
         more = _untold(result[1], result[2]) - untold
         if not more:
             return result
@@ -319,27 +336,34 @@ def _solve_in_rounds(
     shared: bool,
     joints: Array | None,
     untold: frozenset[str],
-) -> tuple[Solution, Problem, Components | None, Curves]:
+    weighed: bool = False,
+) -> tuple[Solution, Problem, Components | None, Curves, Sizes]:
     """Solve in rounds, with the deviations of what is `untold` as they are."""
     every, within = problem, limits
     curves = Curves.none_of(problem)
     if curves:
         problem = replace(problem, free=problem.free.without(curves.names))
         limits = _within(within, every.free, problem.free)
+    sizes = Sizes.none_of(problem) if weighed else NO_SIZES
+    priors = priors_beforehand(every.free.parameters)
     joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
     solution = solve_with_joints(problem, joints, loss, limits, small)
     steps = solution.steps
     components = None
-    for _ in range(_ROUNDS + (curves.rounds if curves else 0)):
+    most = _ROUNDS + (curves.rounds if curves else 0) + (_ROUNDS if sizes else 0)
+    for number in range(most):
         if loss == "linear" and shared:
-            components = estimated_components(problem, solution, limits, components, untold)
+            components = estimated_components(problem, solution, limits, components, untold, each=weighed)
             next_problem, change, joints = _with_components(problem, components, joints)
         else:
             next_problem, change = _with_scale(problem, solution, loss)
         values = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
         started = FreeParameters(tuple(replace(p, value=values[p.name]) for p in problem.free.parameters))
         next_problem = replace(next_problem, robot=problem.robot.with_values(values), free=started)
-        if curves.rounds:
+        if sizes:
+            next_problem, sizes, more, joints = with_sizes(next_problem, sizes, joints, solution.weight, priors)
+            change = max(change, more)
+        if curves.rounds and (number >= _ROUNDS_OF_SIZES or not sizes):
             next_problem, curves, joints = with_stiffness(next_problem, every.free, curves, joints, solution.weight)
             limits, change = _within(within, every.free, next_problem.free), np.inf
         if change < _SETTLED and _load_shift(problem, next_problem) < _LOADS_AGREE * small:
@@ -349,7 +373,7 @@ def _solve_in_rounds(
         problem = next_problem
         solution = solve_with_joints(problem, joints, loss, limits, small, curves.design_effect)
         steps += solution.steps
-    return replace(solution, steps=steps), problem, components, curves
+    return replace(solution, steps=steps), problem, components, curves, sizes
 
 
 def _within(
@@ -395,8 +419,12 @@ def estimated_components(
     limits: tuple[Array, Array] | None,
     before: Components | None = None,
     untold: frozenset[str] = frozenset(),
+    *,
+    each: bool = False,
 ) -> Components:
-    """Estimate the variances of readings and joints at a solution, those of :func:`factors_of` and of joints alike.
+    """Estimate the variances of readings and joints at a solution, those of :func:`factors_of` and of joints.
+
+    Joints of a kind are alike, or `each` is by itself, where every effect is in the model.
 
     Declared deviations are widened if residuals are larger than chance allows (1 in 1000), or were before. Variances
     that are `untold` stay as they are.
@@ -419,6 +447,8 @@ def estimated_components(
     )
     kinds = np.array([joint.kind for joint in problem.robot.joints])
     alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
+    if each:
+        alike = [np.array([i]) for i in range(len(kinds))]
     free = [name not in (DECLARED, SETUP, *untold) for name in names]
     least = np.array(
         [(_NOISE_FLOOR / problem.noise[n]) ** 2 if f else _LEAST_WIDENED for f, n in zip(free, names, strict=True)]

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from truearm.engine.choosing.chosen_fit import identify_chosen
 from truearm.engine.choosing.selection import select
+
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.fit import identify

@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from truearm.calibration.calibrate import calibrate
-from truearm.engine.choosing.zones import error_sizes, flange_places
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
 from truearm.engine.diagnose.simulated_calibrations import simulated_calibrations
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import named_model
+from truearm.engine.fit.zones import error_sizes, flange_places
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parameters import PLACES
 from truearm.engine.twin.truths import truth_twin

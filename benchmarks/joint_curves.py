@@ -16,8 +16,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-
 from truearm.engine.choosing.selection import select
+
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.document.tables import standard_error

@@ -17,10 +17,10 @@ from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
 from papers.texts import Rows, told
 from papers.traces import coordinates, in_space, scatter, scene
-from truearm.engine.choosing.zones import identify_zones
 from truearm.engine.data.statistics import Spread
 from truearm.engine.document.drawing import AFTER, BEFORE, COLOURS, Figure, axis, figure, logarithmic_axis, rounded
 from truearm.engine.fit.models import named_model
+from truearm.engine.fit.zones import identify_zones
 from truearm.engine.robot.chain import Array
 from truearm.engine.twin.devices import DEVICES
 from truearm.engine.twin.devices.device import Device

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from truearm.engine.choosing.chosen_fit import identify_chosen
+from truearm.engine.choosing.selection import select
 
 from papers import Progress
 from papers.irb120 import ELASTIC, without_beta
@@ -18,8 +20,6 @@ from papers.seeds import Figures, Seed, gathered, over_seeds
 from papers.study import Study
 from papers.texts import Rows, told
 from truearm.engine.base.errors import InputError
-from truearm.engine.choosing.chosen_fit import identify_chosen
-from truearm.engine.choosing.selection import select
 from truearm.engine.data.checks import clean_references
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.rigid_tool import constellation

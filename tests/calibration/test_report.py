@@ -16,13 +16,13 @@ from typing import Any, Final
 import numpy as np
 import pytest
 from tests.expecting import known
+from truearm.engine.choosing.search import Gain
+from truearm.engine.choosing.selection import Candidate, Selection
 
 from truearm.calibration.figures import candidates_figure, candidates_table, choice_sentence, curve_figure, curves_table
 from truearm.calibration.report import Report, report_html
 from truearm.calibration.result import Calibration
 from truearm.engine.base.errors import Notice
-from truearm.engine.choosing.search import Gain
-from truearm.engine.choosing.selection import Candidate, Selection
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.diagnose.curves import FittedCurve

@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
 from truearm.commands import program
-from truearm.engine.choosing.zones import boxes_of, cut_boxes, divisions_for, flange_places, read_zones
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
+from truearm.engine.fit.zones import boxes_of, cut_boxes, divisions_for, flange_places, read_zones
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot_file.seal import is_intact
 from truearm.engine.twin.devices import named_device

@@ -13,7 +13,6 @@ from ruamel.yaml import YAML
 from truearm.board.readings import read_hand_eye
 from truearm.drawn_circle.pages import Page, read_drawn_circles
 from truearm.engine.base.errors import InputError
-from truearm.engine.choosing.zones import boxes_of, read_zones
 from truearm.engine.command.loading import load_robot
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.excluded import read_exclusions
@@ -23,6 +22,7 @@ from truearm.engine.data.readers.mapping import MappingFile
 from truearm.engine.data.readers.robodk import read_robodk
 from truearm.engine.data.readers.table import read_noting
 from truearm.engine.fit.bounds import read_bounds
+from truearm.engine.fit.zones import boxes_of, read_zones
 from truearm.engine.motion.constraints import read_constraints
 from truearm.engine.motion.path_file import read_path
 from truearm.engine.programs.cell import read_frames, read_tools, read_wrenches

@@ -44,10 +44,10 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
     )
     model: str = option(
         Choice("MODEL", _models),
-        "offsets, joints, geometric, elastic, tilting, full; auto: the effects that the data can carry; frames: base, "
-        "tool and fixtures alone.",
+        "offsets, joints, geometric, elastic, tilting, full; auto: every joint effect, as large as the data tell; "
+        "frames: base, tool and fixtures alone.",
         default="geometric",
-        more="``auto`` decides by cross-validation on the training part.",
+        more="``auto`` chooses nothing: what the training part does not support shrinks to nothing.",
     )
     loss: Loss = option(
         Choice("LOSS", ("linear", "huber", "cauchy", "l1", "l1-components")),
@@ -128,7 +128,7 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
         """Refuse what does not go together."""
         if self.effects and self.model == "auto":
             raise InputError(
-                "the model auto chooses its effects itself",
+                "the model auto has every joint effect",
                 parameter="effects",
                 came=self.effects[0],
                 cure="Name another model.",

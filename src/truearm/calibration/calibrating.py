@@ -19,13 +19,6 @@ from truearm.engine.base.errors import InputError, Notice, Rule, listed, refusal
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.version import __version__
-from truearm.engine.choosing.candidates import (
-    compared_with,
-    refuse_balancers_that_are_not_there,
-    without_unseen_balancers,
-)
-from truearm.engine.choosing.chosen_fit import check_choice, check_part, identify_chosen
-from truearm.engine.choosing.selection import AUTO, Selection, select
 from truearm.engine.command.arguments import (
     files_of,
     folder_for,
@@ -59,6 +52,14 @@ from truearm.engine.diagnose.simulated_calibrations import (
     simulated_calibrations,
 )
 from truearm.engine.fit.bounds import Bounds, read_bounds
+from truearm.engine.fit.every_effect import (
+    AUTO,
+    Shares,
+    check_shares,
+    identify_every_effect,
+    refuse_balancers_that_are_not_there,
+    without_unseen_balancers,
+)
 from truearm.engine.fit.fit import Fit, Status, identify, place
 from truearm.engine.fit.fixed_places import FixedPlaces
 from truearm.engine.fit.likelihood import WhitenedProblem
@@ -227,13 +228,13 @@ class _Parts:
 class _Identified:
     """What was identified."""
 
-    robot: Robot  #: The nominal one, with the effects of the chosen model.
+    robot: Robot  #: The nominal one, with the periods of gears that were found.
     placed: Robot  #: The nominal one, base and targets found as the fit finds them.
     model: Model
     fit: Fit
-    selection: Selection | None  #: How the model was chosen; None if it was named.
+    shares: Shares | None  #: What every effect does; None if the model was named.
     contradicted: tuple[Notice, ...]  #: What speaks against what was held.
-    notices: tuple[Notice, ...]  #: What is to be known about effects that were held, and about the choice.
+    notices: tuple[Notice, ...]  #: What is to be known about the effects.
 
 
 def calibrated(asked: Calibrate) -> Calibration:
@@ -321,23 +322,20 @@ def _identified(asked: Calibrate, read: _Read, parts: _Parts) -> _Identified:
     placed = place(robot, first, asked.loss, read.fixed)
     if asked.monte_carlo is not None:
         refuse_too_many(placed, first, read.model or GEOMETRIC)
-    selection, compared, notices = None, first, list[Notice]()
+    shares, notices = None, list[Notice]()
     if read.model is None:
-        compared = compared_with(robot, first)
-        selection = select(robot, compared, **read.options, held=read.fixed, seed=asked.seed, progress=asked.progress)
         with followed(asked.progress, parts.judges, held_out=parts.second is not None):
-            selection, fit = identify_chosen(
+            robot, fit, shares = identify_every_effect(
                 robot,
                 first,
-                selection,
                 **read.options,
-                held=read.fixed,
+                fixed=read.fixed,
                 bootstrap=asked.bootstrap,
                 seed=asked.seed,
                 progress=asked.progress,
             )
-        robot, model = selection.prepared(robot), selection.model
-        notices += [*check_choice(selection), *check_part(compared, first)]
+        model = fit.model
+        notices += check_shares(shares)
     else:
         model, notices = without_unseen_balancers(read.model, first)
         asked.progress(f"identifying the {model.name} model on {len(parts.training)} configurations")
@@ -353,7 +351,7 @@ def _identified(asked: Calibrate, read: _Read, parts: _Parts) -> _Identified:
                 progress=asked.progress,
             )
     contradicted = check_fixed_places(robot, fit, first, **read.options)
-    return _Identified(robot, placed, model, fit, selection, tuple(contradicted), tuple(notices))
+    return _Identified(robot, placed, model, fit, shares, tuple(contradicted), tuple(notices))
 
 
 def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -> Calibration:
@@ -426,7 +424,7 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
         command=asked.again,
         history=_history(asked, read, parts, solved),
         urdf=read.urdf,
-        selection=solved.selection,
+        shares=solved.shares,
         known_before=_known_before(solved.robot),
         without=tuple(asked.without),
         excluded=parts.excluded,

@@ -11,11 +11,7 @@ import numpy as np
 
 from truearm.calibration.parts import mdeg, name_of
 from truearm.calibration.zones import ZoneChoice
-from truearm.engine.base.errors import counted, listed
 from truearm.engine.base.units import SHOWN_AS, from_si
-from truearm.engine.choosing.cross_validation import FOLDS
-from truearm.engine.choosing.selection import Selection
-from truearm.engine.choosing.zones import Box, shown_box
 from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.error_budget import ErrorBudget, Share, shown_shares
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
@@ -31,7 +27,8 @@ from truearm.engine.document.drawing import (
     rounded_to,
     significant,
 )
-from truearm.engine.document.summaries import LAYOUT
+from truearm.engine.fit.every_effect import Shares
+from truearm.engine.fit.zones import Box, shown_box
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.parameters import PLACES
@@ -300,137 +297,53 @@ def coverage_figure(simulated: SimulatedCalibrations, robot: Robot) -> Figure:
     )
 
 
-# How a model was chosen: what every joint effect gains, as a picture and as rows.
+# What every effect does, as a picture and as rows.
 
-#: Gains are drawn in proportion up to this at least [mm].
-_SMALLEST: Final = 1e-4
-
-
-def choice_sentence(selection: Selection) -> str:
-    """Return how the choice was made, in words."""
-    held_out = (
-        f"{counted(selection.blocks, 'block')} of neighbours, because the configurations {LAYOUT[selection.layout]}"
-        if selection.blocks
-        else "configurations drawn one by one"
-    )
-    elastic = "" if selection.elastic is None else f", that of the elastic model {selection.elastic * 1e3:.4f} mm"
-    return (
-        f"By {FOLDS}-fold cross-validation on the training configurations alone, holding out {held_out}. The mean "
-        f"error of the geometric model there is {selection.geometric * 1e3:.4f} mm{elastic}, that of the chosen model "
-        f"{selection.error * 1e3:.4f} mm. Errors of every choice follow in closed form from one fit; of those that are "
-        "not worse than the best one by a standard error, the one with the fewest parameters was taken. Gains are "
-        "those over the chosen model without the effect, or what it would gain with it. A fold trains on four fifths "
-        "of the configurations, and what is chosen looked best in these folds; the error of held-out readings may be "
-        "smaller or larger than the one here: believe the held-out one."
-    )
+#: Moves of the targets are drawn in proportion up to this [mm], by their logarithm beyond.
+_LINEAR: Final = 1e-3
 
 
-def candidates_table(selection: Selection) -> Table:
-    """Return a row for every joint effect that could be chosen."""
+def shares_table(shares: Shares) -> Table:
+    """Return a row for every joint effect."""
     rows = [
         (
-            candidate.effect,
-            "–" if candidate.gain is None else f"{candidate.gain.mean * 1e3:+.4f}",
-            "–" if candidate.gain is None else f"{candidate.gain.error * 1e3:.4f}",
-            "taken" if candidate.taken else f"left out: {candidate.reason}",
+            share.effect,
+            "–" if share.moves is None else f"{share.moves * 1e3:.4f}",
+            "–" if share.moves is None else f"{share.known:.1f} of {share.parameters}",
+            share.reason,
         )
-        for candidate in selection.candidates
+        for share in shares.effects
     ]
-    taken = tuple("taken" if candidate.taken else "" for candidate in selection.candidates)
-    heading = ("joint effect", "gain [mm]", "standard error [mm]", "")
-    return Table(heading, rows, texts=(3,), name="selection", wide=True, marks=taken)
+    marks = tuple("taken" if share.taken else "" for share in shares.effects)
+    heading = ("joint effect", "moves the targets by [mm]", "parameters that the data tell", "")
+    return Table(heading, rows, texts=(2, 3), name="selection", wide=True, marks=marks)
 
 
-def confirmations_table(selection: Selection) -> Table:
-    """Return a row for every model that was fitted in the folds."""
-    rows = [
-        (
-            listed(confirmation.effects) or "geometric",
-            f"{confirmation.error * 1e3:.4f}",
-            listed(confirmation.smaller) or "geometric",
-            f"{confirmation.smaller_error * 1e3:.4f}",
-            f"{confirmation.gain.mean * 1e3:+.4f}",
-            f"{confirmation.gain.error * 1e3:.4f}",
-        )
-        for confirmation in selection.confirmations
-    ]
-    heading = ("model", "error [mm]", "instead of", "error [mm]", "gain [mm]", "standard error [mm]")
-    return Table(heading, rows, texts=(2,), name="confirmations", wide=True)
-
-
-def candidates_figure(selection: Selection) -> Figure:
-    """Show what every joint effect that was tried gains, with its standard error.
-
-    The axis is linear near no gain and logarithmic beyond, so that what little effects gain is seen beside a large one.
-    """
-    tried = [candidate for candidate in reversed(selection.candidates) if candidate.gain is not None]
-    errors = [
-        1e3 * candidate.gain.error for candidate in tried if candidate.gain is not None and candidate.gain.error > 0.0
-    ]
-    linear = max(float(np.median(errors)) if errors else 0.0, _SMALLEST)
-    ends: list[float] = [linear]
-    traces = []
-    for taken, name, colour in ((True, "taken", AFTER), (False, "left out", BEFORE)):
-        of_kind = [candidate for candidate in tried if candidate.taken is taken]
-        gains = np.array([1e3 * candidate.gain.mean for candidate in of_kind if candidate.gain is not None])
-        error = np.array([1e3 * candidate.gain.error for candidate in of_kind if candidate.gain is not None])
-        place = _on_axis(gains, linear)
-        above, below = _on_axis(gains + error, linear), _on_axis(gains - error, linear)
-        ends += [*(gains + error).tolist(), *(gains - error).tolist()]
-        traces.append(
-            {
-                "type": "bar",
-                "orientation": "h",
-                "name": name,
-                "y": [html.escape(candidate.effect) for candidate in of_kind],
-                "x": rounded(place, 4),
-                "customdata": rounded(gains, 4),
-                "error_x": {
-                    "type": "data",
-                    "symmetric": False,
-                    "array": rounded(above - place, 4),
-                    "arrayminus": rounded(place - below, 4),
-                },
-                "marker": {"color": colour, "line": {"width": 0}},
-                "hovertemplate": "%{y}: gains %{customdata} mm<extra></extra>",
-            }
-        )
-    low, high = min(min(ends), -linear), max(max(ends), linear)
-    left, right = _on_axis(np.array([low, high]), linear).tolist()
-    margin = 0.2 * (right - left)
-    marks = [0.0, *(sign * 10.0**power for power in range(-5, 3) for sign in (-1.0, 1.0))]
-    marks = sorted(mark for mark in marks if low <= mark <= high and (mark == 0.0 or abs(mark) >= 0.5 * linear))
-    labels = [
-        {
-            "x": 1.0,
-            "xref": "paper",
-            "y": html.escape(candidate.effect),
-            "text": f"{candidate.gain.mean * 1e3:+.4f} ± {candidate.gain.error * 1e3:.4f}",
-            "xanchor": "right",
-            "showarrow": False,
-            "font": {"size": 11},
-        }
-        for candidate in tried
-        if candidate.gain is not None
-    ]
+def shares_figure(shares: Shares) -> Figure:
+    """Show by how much every effect of the model moves the targets; the axis is logarithmic beyond a micrometre."""
+    among = [share for share in reversed(shares.effects) if share.moves is not None]
+    moves = np.array([1e3 * (share.moves or 0.0) for share in among])
+    bars = {
+        "type": "bar",
+        "orientation": "h",
+        "y": [html.escape(share.effect) for share in among],
+        "x": rounded(np.log10(1.0 + moves / _LINEAR), 4),
+        "customdata": rounded(moves, 4),
+        "marker": {"color": AFTER, "line": {"width": 0}},
+        "hovertemplate": "%{y}: %{customdata} mm<extra></extra>",
+    }
+    marks = np.array([0.0, *(10.0**power for power in range(-3, 3) if 10.0**power <= moves.max(initial=0.01))])
     return figure(
-        traces,
-        120 + 26 * len(tried),
+        [bars],
+        120 + 26 * len(among),
         xaxis={
-            **axis("gain of the mean held-out error [mm], logarithmic beyond its usual standard error"),
-            "range": [left - 0.02 * (right - left), right + margin],
-            "tickvals": rounded(_on_axis(np.array(marks), linear), 4),
+            **axis("moves the targets by [mm], a root mean square; logarithmic beyond 0.001 mm"),
+            "tickvals": rounded(np.log10(1.0 + marks / _LINEAR), 4),
             "ticktext": [f"{mark:g}" for mark in marks],
         },
-        yaxis={**axis(""), "type": "category", "categoryorder": "array", "categoryarray": [o.effect for o in tried]},
+        yaxis={**axis(""), "type": "category"},
         margin={"l": 160, "r": 16, "t": 16, "b": 48},
-        annotations=labels,
     )
-
-
-def _on_axis(gain: Array, linear: float) -> Array:
-    """Return where gains [mm] are drawn: in proportion up to about `linear`, by their logarithm beyond."""
-    return np.asarray(np.sign(gain) * np.log10(1.0 + np.abs(gain) / linear))
 
 
 def zones_table(choice: ZoneChoice) -> Table:

@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 from truearm.calibration.figures import (
     budget_figure,
     budget_table,
-    candidates_figure,
-    candidates_table,
-    choice_sentence,
-    confirmations_table,
     coverage_figure,
     curve_figure,
     curve_name,
     curves_table,
     intervals_table,
+    shares_figure,
+    shares_table,
     workspace_budget_figure,
     zones_figure,
     zones_table,
@@ -158,8 +156,8 @@ class Report:
             drawn[curve_name(curve)] = curve_figure(curve)
         if run.zones is not None and any(verdict.zone is not None for verdict in run.zones.verdicts):
             drawn["zone-errors"] = zones_figure(run.zones)
-        if run.selection is not None:
-            drawn["candidates"] = candidates_figure(run.selection)
+        if run.shares is not None:
+            drawn["shares"] = shares_figure(run.shares)
         drawn["correlations"] = correlation_map(run.fit)
         return drawn
 
@@ -198,7 +196,7 @@ def report_html(calibration: Calibration) -> str:
             _residuals(report, drawn),
             *_curves(run, drawn),
             *_zones(run, drawn),
-            *_choice(run, drawn),
+            *_shares(run, drawn),
             _parameters(fit),
             *_monte_carlo(run, drawn),
             _correlations(fit, drawn),
@@ -449,16 +447,17 @@ def _zones(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
     return [Section("Zones of the workspace", [Words(words), *pictures, zones_table(run.zones)], "zones")]
 
 
-def _choice(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
-    chosen = run.selection
-    if chosen is None:
+def _shares(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
+    if run.shares is None:
         return []
-    picture = Picture("candidates", drawn["candidates"])
-    blocks: list[Block] = [Words(choice_sentence(chosen)), picture, candidates_table(chosen)]
-    if chosen.confirmations:
-        words = "Fitted in every fold, with weights, penalties and periods found from the other folds alone:"
-        blocks += [Words(words), confirmations_table(chosen)]
-    return [Section("How the model was chosen", blocks, "choice")]
+    words = (
+        "Every joint effect that robot and data say something of is in the model. How large each may be, the data "
+        "tell: what they do not support shrinks to nothing. The table says by how much each effect moves the targets "
+        "at the training configurations, and how many of its parameters the data tell. Effects may stand in for each "
+        "other where the data do not tell them apart."
+    )
+    blocks: list[Block] = [Words(words), Picture("shares", drawn["shares"]), shares_table(run.shares)]
+    return [Section("What every effect does", blocks, "choice")]
 
 
 def _parameters(fit: Fit) -> Section:

@@ -28,8 +28,6 @@ from truearm.calibration.zones import ZONES_FILE, ZoneChoice, robot_file_of, zon
 from truearm.engine.base.errors import InputError, Notice, counted, did_you_mean, has_error, listed
 from truearm.engine.base.units import SHOWN_AS, Marked, from_si
 from truearm.engine.base.writing import output_folder, write_files
-from truearm.engine.choosing.selection import Selection
-from truearm.engine.choosing.zones import ZoneVerdict, flange_places
 from truearm.engine.command.reading import Excluded, excluded_block
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
@@ -41,9 +39,11 @@ from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
 from truearm.engine.document.document import Block, detail, each, json_of, leaves_of, say, under
 from truearm.engine.document.records import Record
-from truearm.engine.document.summaries import error_line, errors_summary, expected_blocks, noise_blocks, selection_block
+from truearm.engine.document.summaries import error_line, errors_summary, expected_blocks, noise_blocks, shares_block
 from truearm.engine.document.tables import parameter_lines
+from truearm.engine.fit.every_effect import Shares
 from truearm.engine.fit.fit import Fit, Status
+from truearm.engine.fit.zones import ZoneVerdict, flange_places
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.proof import Proof
@@ -73,7 +73,7 @@ class Calibration(Record):
     command: str  #: How to run it again.
     history: str  #: What was done, in one line with the hash of the data.
     urdf: bytes | None = None  #: The user's own URDF, if that is where the robot came from.
-    selection: Selection | None = None  #: How the model was chosen; None if it was named.
+    shares: Shares | None = None  #: What every effect does, where all are in the model; None if it was named.
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
     known_before: Proof | None = None  #: What was known of the robot from an earlier calibration; None if nothing was.
     without: tuple[str, ...] = ()  #: Labels of the configurations that were left out; `data` does not have them.
@@ -190,8 +190,8 @@ class Calibration(Record):
             yield simulated_block(self.monte_carlo, self.robot)
         if self.zones is not None:
             yield under("zones", self.zones.blocks())
-        if self.selection is not None:
-            yield selection_block(self.selection)
+        if self.shares is not None:
+            yield shares_block(self.shares)
         if self.fit.model.name == "frames":
             yield detail(*self._target_lines())
 

@@ -10,7 +10,14 @@ from typing import Final
 
 from truearm.engine.base.errors import InputError, counted, millimetres, refusals_of
 from truearm.engine.base.files import path_argument
-from truearm.engine.choosing.zones import (
+from truearm.engine.command.arguments import whole_argument
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.document.document import Block, detail, each, say
+from truearm.engine.fit.bounds import Bounds
+from truearm.engine.fit.fit import Fit
+from truearm.engine.fit.losses import Loss
+from truearm.engine.fit.rounds import Redundant
+from truearm.engine.fit.zones import (
     FEWEST,
     MOST,
     SCHEMA,
@@ -25,13 +32,6 @@ from truearm.engine.choosing.zones import (
     shown_box,
     zoned_mean,
 )
-from truearm.engine.command.arguments import whole_argument
-from truearm.engine.data.dataset import Dataset
-from truearm.engine.document.document import Block, detail, each, say
-from truearm.engine.fit.bounds import Bounds
-from truearm.engine.fit.fit import Fit
-from truearm.engine.fit.losses import Loss
-from truearm.engine.fit.rounds import Redundant
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.writing import robot_text
 
@@ -185,7 +185,7 @@ def choose_zones(
     redundancy: Redundant,
     bounds: Bounds | None,
 ) -> ZoneChoice:
-    """Identify and judge zones, see :func:`truearm.engine.choosing.zones.judge_zones`."""
+    """Identify and judge zones, see :func:`truearm.engine.fit.zones.judge_zones`."""
     training, held_out = parts
     if not training.anchored:
         raise InputError(

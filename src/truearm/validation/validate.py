@@ -21,7 +21,6 @@ from truearm.engine.base.errors import (
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.writing import output_folder, write_files
-from truearm.engine.choosing.zones import ZonedRobot, zoned_robot
 from truearm.engine.command.arguments import (
     data_argument,
     files_of,
@@ -41,6 +40,7 @@ from truearm.engine.document.records import Record
 from truearm.engine.document.summaries import error_line, errors_summary, refit_block
 from truearm.engine.fit.refit import Refit
 from truearm.engine.fit.refit import refit as find_moved
+from truearm.engine.fit.zones import ZonedRobot, zoned_robot
 from truearm.engine.robot.effects.warm_up import LEFT
 from truearm.engine.robot.proof import BASE
 from truearm.engine.robot.robot import Robot

@@ -240,7 +240,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 "The robot has no link masses and no payload, so nothing loads its joints. Compliance cannot be found."
             )
         )
-    elif unknown:
+    elif unknown and not fit.model.weighed:
         notices.append(
             EFFECTS_UNINFORMED(
                 f"The data say nothing about {', '.join(unknown)}. Either nothing loads these joints that way (gravity "
@@ -248,6 +248,8 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 "stay near zero."
             )
         )
+    if fit.model.weighed:  # what the data do not tell has shrunk, and its uncertainty is counted
+        return [*notices, *_check_signs(fit)]
     tilting = {p.name for effect in robot.effects if effect.tilts for p in effect.parameters}
     assumed = [
         joint.name
@@ -268,18 +270,23 @@ def _check_effects(fit: Fit) -> list[Notice]:
             TOO_MANY_EFFECTS(
                 f"Of {len(own)} parameters of joint effects, {len(vague)} rest more on their priors than on the data: "
                 f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}. There are too few configurations "
-                f"for so many effects. Measure more{'' if fit.model.tried else ', or let `model=auto` choose'}."
+                f"for so many effects. Measure more, or use `model=auto`, which weighs them."
             )
         )
+    return [*notices, *_check_signs(fit)]
+
+
+def _check_signs(fit: Fit) -> list[Notice]:
+    """Say which springs, plays and gaps came out negative."""
     soft = _negative(fit)
-    if soft:
-        notices.append(
-            NEGATIVE_EFFECT(
-                f"{', '.join(soft)} came out negative, as no spring and no play is: masses, payload or gravity may be "
-                "wrong, or the parameter stands for something else that the model lacks."
-            )
+    if not soft:
+        return []
+    return [
+        NEGATIVE_EFFECT(
+            f"{', '.join(soft)} came out negative, as no spring and no play is: masses, payload or gravity may be "
+            "wrong, or the parameter stands for something else that the model lacks."
         )
-    return notices
+    ]
 
 
 def _negative(fit: Fit) -> list[str]:

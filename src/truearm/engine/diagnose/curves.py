@@ -43,20 +43,14 @@ def about_curves(fit: Fit, configurations: int) -> str:
     """
     if has_curves(fit) or not JointCurve(fit.robot.layout).parameters:
         return ""
-    tried = JointCurve.name in fit.model.tried
+    looked_for = JointCurve.name in fit.model.effects
     if configurations < ENOUGH:
-        left_out = "cross-validation left `joint-curve` out, but " if tried else ""
+        compare = "" if looked_for else f", and compare with `effects={JointCurve.name}`"
         words = (
-            f"{left_out}errors that follow a joint's angle, as those of gears and encoders do, cannot be told from "
-            f"{counted(configurations, 'training configuration')}: measure about {ENOUGH}, and compare with "
-            f"`effects={JointCurve.name}`"
+            f"errors that follow a joint's angle, as those of gears and encoders do, cannot be told from "
+            f"{counted(configurations, 'training configuration')}: measure about {ENOUGH}{compare}"
         )
-    elif tried:
-        words = (
-            f"cross-validation tried `{JointCurve.name}` and left it out, because it gained no more than chance may or "
-            f"was not borne out; to see what it does all the same, compare with `effects={JointCurve.name}`"
-        )
-    elif JointCurve.name in fit.model.effects:
+    elif looked_for:
         return ""
     else:
         words = (
@@ -101,7 +95,7 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
         elif high - low < 2.0 * math.pi - _GAP:
             partly.append(f"{name} from {np.rad2deg(low):.0f} to {np.rad2deg(high):.0f} deg")
     notices = []
-    if little or none:
+    if (little or none) and not fit.model.weighed:
         words = []
         if none:
             words.append(f"these readings show no error that follows the angle of {', '.join(none)}")
@@ -114,7 +108,7 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
                 "more of the turn, may show one."
             )
         )
-    if Fourier.name in fit.model.effects:
+    if Fourier.name in fit.model.effects and not fit.model.weighed:
         notices.append(
             CURVES_AND_FOURIER(
                 "The model has curves of the joints and the effect fourier, whose one and two periods a turn curves "

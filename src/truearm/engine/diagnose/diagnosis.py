@@ -62,7 +62,7 @@ def check_residual(left: LeftOver) -> list[Notice]:
     seeming = joints_as_far_off(left)
     if seeming <= _LARGEST:
         return []
-    off, more = math.degrees(seeming), "" if fit.model.tried else " (try `model=auto`)"
+    off, more = math.degrees(seeming), "" if fit.model.weighed else " (try `model=auto`)"
     return [
         LARGE_RESIDUAL(
             f"The readings are left as far off as if every joint missed by {off:.2g} deg at each visit. Arms repeat "

@@ -138,10 +138,14 @@ def other_model(fit: Fit, candidate: Explanation, known: float) -> NextStep:
     if candidate.cause == Fourier.name:
         words = (
             f"Add `effects={candidate.cause}`, or `effects={JointCurve.name}`, which contains it and is found from "
-            f"some 100 configurations on, or let `model=auto` choose: it explains {share} of what is left."
+            f"some 100 configurations on, or use `model=auto`, which has every effect: it explains {share} of what "
+            "is left."
         )
         return NextStep("other-model", words, gain)
-    words = f"Add `effects={candidate.cause}`, or let `model=auto` choose: it explains {share} of what is left."
+    words = (
+        f"Add `effects={candidate.cause}`, or use `model=auto`, which has every effect: it explains {share} of what is "
+        "left."
+    )
     return NextStep("other-model", words, gain)
 
 
@@ -441,9 +445,9 @@ def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
     effects = (
         ", and no effect known here explains more of it."
         if can_explain(left)
-        else ", and cross-validation found no other joint effect that explains more of it."
-        if fit.model.tried
-        else ". The curves leave too few equations to try other joint effects beside them: `model=auto` compares them."
+        else ", and every joint effect known here is in the model."
+        if fit.model.weighed
+        else ". The curves leave too few equations to try other joint effects beside them: `model=auto` has them all."
         if has_curves(fit)
         else ". There are too few readings to tell whether joint effects would explain more of it."
     )

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.engine.base.limits import limit
-from truearm.engine.choosing.candidates import open_effects
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
+from truearm.engine.fit.every_effect import open_effects
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array

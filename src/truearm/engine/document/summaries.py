@@ -8,55 +8,36 @@ from typing import Any, Final
 
 from truearm.engine.base.errors import counted, degrees, listed, millimetres
 from truearm.engine.base.units import from_si
-from truearm.engine.choosing.selection import Selection
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.statistics import Errors, Spread
 from truearm.engine.diagnose.expected_error import Expectation, ExpectedError
 from truearm.engine.diagnose.gain import Repeatability
 from truearm.engine.document.document import Block, detail, say
+from truearm.engine.fit.every_effect import Shares
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.refit import Refit
 from truearm.engine.robot.parts import Payload
 
-#: How configurations lie that are held out in blocks, in words.
-LAYOUT: Final = {"path": "follow a path", "grid": "lie on a grid", "close": "lie close to each other"}
 #: What deviations of a bootstrap follow from, after their number.
 BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 
 
-def selection_block(selection: Selection) -> Block:
-    """Return how a model was chosen: errors in mm."""
-    text = [f"Chosen model: {selection.model.summary}"]
-    if selection.blocks:
-        text.append(
-            f"  judged on {selection.blocks} blocks of neighbours: the configurations {LAYOUT[selection.layout]}"
-        )
+def shares_block(shares: Shares) -> Block:
+    """Return what every effect does: by how much it moves the targets, in mm."""
+    moving = [share for share in shares.effects if share.taken]
+    words = [f"{share.effect} {(share.moves or 0.0) * 1e3:.3f} mm" for share in moving]
+    text = f"Effects (root mean square at the targets): {', '.join(words) or 'none that moves them'}"
     figures = {
-        "geometric_mm": selection.geometric * 1e3,
-        "elastic_mm": None if selection.elastic is None else selection.elastic * 1e3,
-        "error_mm": selection.error * 1e3,
-        "layout": selection.layout,
-        "blocks": selection.blocks,
         "candidates": [
             {
-                "effect": candidate.effect,
-                "taken": candidate.taken,
-                "gain_mm": None if candidate.gain is None else candidate.gain.mean * 1e3,
-                "standard_error_mm": None if candidate.gain is None else candidate.gain.error * 1e3,
-                "reason": candidate.reason,
+                "effect": share.effect,
+                "taken": share.taken,
+                "moves_mm": None if share.moves is None else share.moves * 1e3,
+                "known": share.known,
+                "parameters": share.parameters,
+                "reason": share.reason,
             }
-            for candidate in selection.candidates
-        ],
-        "confirmations": [
-            {
-                "effects": list(confirmation.effects),
-                "smaller": list(confirmation.smaller),
-                "error_mm": confirmation.error * 1e3,
-                "smaller_error_mm": confirmation.smaller_error * 1e3,
-                "gain_mm": confirmation.gain.mean * 1e3,
-                "standard_error_mm": confirmation.gain.error * 1e3,
-            }
-            for confirmation in selection.confirmations
+            for share in shares.effects
         ],
         "lines": [
             {
@@ -65,11 +46,10 @@ def selection_block(selection: Selection) -> Block:
                 "aliases": list(line.aliases),
                 "amplitude_mdeg": math.degrees(line.amplitude) * 1e3,
             }
-            for line in selection.lines
+            for line in shares.lines
         ],
-        "passed_over": [{"effects": list(effects), "status": status} for effects, status in selection.passed_over],
     }
-    return say(*text, selection=figures)
+    return say(text, selection=figures)
 
 
 def errors_summary(errors: Errors) -> dict[str, Any]:

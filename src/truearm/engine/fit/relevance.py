@@ -145,16 +145,17 @@ def _climbed(
     """Return the likeliest deviation of each group, what the data know of it, and the variance of the noise."""
     A, b, squares = moments[:-1, :-1], moments[:-1, -1], float(moments[-1, -1])
     sizes = np.bincount(group, minlength=count)
+    known: Array = np.zeros(count)
     variance, prior = start**2, (_SCALE * scale) ** 2
-    noise, known = 1.0, np.zeros(count)
+    noise = 1.0
     for _ in range(_STEPS):
         root = np.sqrt(variance)[group]
         H = root[:, None] * A * root / noise + np.eye(len(root))
         inverse = np.linalg.inv(np.linalg.cholesky(H))
         half = inverse @ (root * b) / noise
         w = root * (inverse.T @ half)
-        told = 1.0 - (inverse**2).sum(axis=0)
-        known = np.bincount(group, told, count)
+        told = np.asarray(1.0 - (inverse**2).sum(axis=0), dtype=np.float64)
+        known = np.asarray(np.bincount(group, told, count))
         square = np.bincount(group, w**2, count)
         slope = known * prior - square
         new = (-slope + np.sqrt(slope**2 + 4.0 * (known + _SPARSE) * square * prior)) / (2.0 * (known + _SPARSE))
@@ -204,13 +205,29 @@ def expected_sizes(sizes: Sizes, of: CurveMoments, curves: Array, names: Sequenc
         precision = np.linalg.inv(C[np.ix_(mine, mine)])
         told, turned = np.linalg.eigh(precision - np.eye(len(mine)))
         told, pull = np.maximum(told, 0.0), (turned.T @ (precision @ mean[mine])) ** 2
-        tried = np.geomspace(_LEAST, max(1.0, _LARGER * now), _LEVELS)
+        tried = _tried(max(1.0, _LARGER * now))
         larger = ((tried / now) ** 2)[:, None]
         height = 0.5 * (larger * pull / (1.0 + larger * told) - np.log1p(larger * told)).sum(axis=1)
-        height += np.log(tried / (1.0 + (tried / (_SCALE * scale)) ** 2))
+        height += np.log(_believed(tried, scale))
         likely = np.exp(height - height.max())
         expected[mine] = float(likely @ larger[:, 0] / likely.sum())
     return expected
+
+
+def variances_beforehand(sizes: Sizes, names: Sequence[str]) -> Array:
+    """Return what the variance of each parameter is expected to be without readings, by its prior's, ``(names,)``."""
+    tried = _tried(1.0)
+    of_group = [float(tried**2 @ (believed := _believed(tried, scale)) / believed.sum()) for scale in sizes.scale]
+    return np.array([of_group[sizes.place[name]] if name in sizes.place else 1.0 for name in names])
+
+
+def _tried(most: float) -> Array:
+    return np.geomspace(_LEAST, most, _LEVELS)
+
+
+def _believed(deviations: Array, scale: float) -> Array:
+    """Return how likely deviations are beforehand, where they are tried evenly in their logarithms."""
+    return np.asarray(deviations / (1.0 + (deviations / (_SCALE * scale)) ** 2))
 
 
 #: Of a model whose effects have the sizes that their priors say.

@@ -208,7 +208,7 @@ def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
     return [
         TRANSMISSION_ERROR(
             f"What is left over repeats with the joints' angles: {words}. Strain wave gears do that, twice in a turn "
-            "of their wave generator. `model=auto` tries to take the error out; any other model does with the effect "
+            "of their wave generator. `model=auto` takes the error out; any other model does with the effect "
             "transmission-error, and transmission_periods of these joints in the robot file."
         )
     ]

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final
 from truearm.calibration.calibrating import FitStep
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.files import exists, read_text
-from truearm.engine.choosing.selection import AUTO
+from truearm.engine.fit.every_effect import AUTO
 from truearm.engine.fit.losses import LOSSES
 from truearm.engine.fit.models import FRAMES, MODELS
 from truearm.studio import words

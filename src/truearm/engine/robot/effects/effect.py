@@ -78,7 +78,7 @@ class Effect(ABC):
     #: Whether it belongs to the kinematics of the rigid arm. Values far from nominal then mean another robot, other
     #: units or another order of the joints.
     kinematic: ClassVar[bool] = False
-    #: Whether it is tried where cross-validation chooses the effects; others are left to those who ask for them.
+    #: Whether it is tried as an explanation of what a fit leaves; others are left to those who ask for them.
     selectable: ClassVar[bool] = True
     #: Name of the effect that it says how something differs from: a model without that one would have it stand in for
     #: it. Empty where there is none.

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.choosing.zones import Zones, identify_zones
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import MODELS
+from truearm.engine.fit.zones import Zones, identify_zones
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot

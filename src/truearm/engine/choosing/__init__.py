@@ -1,1 +1,0 @@
-"""Which joint effects the data support, and models for zones."""

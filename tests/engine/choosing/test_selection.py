@@ -196,7 +196,7 @@ def test_periods_that_nobody_gave_are_found_and_taken_out() -> None:
     assert [(line.joint, line.periods, line.aliases) for line in chosen.lines] == [(3, 200, ()), (5, 102, ())]
     assert "transmission-error" in chosen.model.effects
     choice, fit = identify_chosen(unknown, data, chosen)
-    assert [joint.transmission_periods for joint in fit.robot.joints] == [None, None, 200, None, 102, None]
+    assert [joint.periods for joint in fit.robot.joints] == [(), (), (200,), (), (102,), ()]
     sine, cosine = (fit.robot.values[f"transmission_{part}_3"] for part in ("sin", "cos"))
     assert np.hypot(sine, cosine) == pytest.approx(2e-4, rel=0.1)
     notice = found_in(choice, "periods-found")

@@ -130,13 +130,12 @@ class Selection:
 
 
 def with_lines(robot: Robot, lines: Sequence[PeriodicError]) -> Robot:
-    """Return a robot whose gears err as often in a turn as was found."""
-    periods = {line.joint: line.periods for line in lines}
+    """Return a robot whose gears also err as often in a turn as was found."""
     joints = tuple(
-        replace(joint, transmission_periods=periods.get(number, joint.transmission_periods))
+        replace(joint, transmission_periods=(*joint.periods, *(n.periods for n in lines if n.joint == number)))
         for number, joint in enumerate(robot.joints, 1)
     )
-    return replace(robot, joints=joints) if periods else robot
+    return replace(robot, joints=joints) if lines else robot
 
 
 def model_with(effects: Sequence[str], candidates: Sequence[str] = SELECTABLE) -> Model:

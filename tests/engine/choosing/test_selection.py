@@ -18,12 +18,13 @@ from truearm.engine.choosing import chosen_fit
 from truearm.engine.choosing.candidates import SELECTABLE
 from truearm.engine.choosing.chosen_fit import check_choice, identify_chosen
 from truearm.engine.choosing.search import Gain, complete, with_bases, without
-from truearm.engine.choosing.selection import Selection, select
+from truearm.engine.choosing.selection import Selection, select, with_lines
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Fit, Status, identify
 from truearm.engine.fit.models import named_model
+from truearm.engine.fit.transmission import PeriodicError
 from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import LinkMass, Payload
@@ -202,6 +203,15 @@ def test_periods_that_nobody_gave_are_found_and_taken_out() -> None:
     notice = found_in(choice, "periods-found")
     assert notice.level == "note"
     assert "joint 3 200 times in a turn, by" in notice.message
+
+
+def test_lines_that_were_found_join_those_that_a_robot_knows() -> None:
+    found = [PeriodicError(joint, n, 1e-4, 0.5, 1e-9) for joint, n in ((3, 400), (4, 100), (4, 300))]
+    robot = with_lines(with_lines(without_periods(), found[:1]), found[1:])
+    assert [joint.periods for joint in robot.joints] == [(), (), (400,), (100, 300), (), ()]
+    again = with_lines(robot, [replace(found[0], periods=200)])
+    assert again.joints[2].periods == (400, 200)
+    assert with_lines(robot, []) is robot
 
 
 def test_positions_on_whole_steps_cannot_tell_periods_apart_and_it_is_said() -> None:

@@ -285,7 +285,7 @@ def least_squares(robot: Robot, data: Dataset, names: Sequence[str], target: str
     poses = _poses(robot, data, names, target, TOLERANCE, dict.fromkeys(names, 1.0))
     centres = [p.restarted(p.value) for p in (robot.parameters[name] for name in names)]
     found = robot
-    for _ in range(_LOADINGS if any(effect.loaded for effect in robot.effects) else 1):
+    for _ in range(_LOADINGS if robot.bends else 1):
         free = FreeParameters(tuple(replace(p, value=found.values[p.name]) for p in centres))
         vector = solve(Problem(found, poses.data, free, {"position": TOLERANCE})).vector
         found = robot.with_values(dict(zip(names, vector, strict=True)))

@@ -248,7 +248,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
                 "stay near zero."
             )
         )
-    tilting = {p.name for effect in robot.effects if effect.tilts for p in effect.parameters}
+    tilting = {p.name for effect in robot.effects if effect.tilts and effect.loaded for p in effect.parameters}
     assumed = [
         joint.name
         for number, joint in enumerate(robot.joints, 1)

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.curves import found_curves
+from truearm.engine.diagnose.curves import fitted_curves
 from truearm.engine.diagnose.expected_error import as_residuals_allow, expected_error
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
@@ -104,7 +104,7 @@ def judged(case: str, seed: int) -> dict[str, Any]:
     stated = expected_error(as_residuals_allow(fit, data)).overall
     clean = measure(twin, robot.random_configurations(JUDGED, rng), EXACT, rng)
     inside, every = [], []
-    for curve in found_curves(fit, data):
+    for curve in fitted_curves(fit, data):
         value, deviation = curve.at(curve.angles)
         held = np.abs(value - true_curve(twin, curve.number, curve.angles)) < 1.96 * deviation
         measured = np.zeros(len(held), dtype=bool)

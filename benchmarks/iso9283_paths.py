@@ -64,7 +64,7 @@ def streams(count: int = 30) -> dict[str, object]:
 
         t, p, truth = stream_of(plan, name, rate, rng, cycles=10, offset=aside, velocity=velocity)
         values, (record,) = path_values(plan, samples_of("AT", name, [(0, t, p)]), HERE, TRACKER)
-        found = record.run.found
+        found = record.run.stream
         assert found is not None
         at = the(values, "AT").value / np.linalg.norm(aside(np.linspace(0, length, 1001)), axis=1).max() - 1
         off = [max(abs(t[a] - b), abs(t[c] - d)) for (a, c), (b, d) in zip(found.cycles, truth, strict=False)]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 import pytest
@@ -24,3 +25,17 @@ def refused(parameter: str | None, words: str, call: Callable[..., object], *giv
         call(*given, **named)
     assert parameter in (None, refusal.value.parameter), refusal.value
     return str(refusal.value)
+
+
+@contextmanager
+def refusing(*parts: str, parameter: str | None = None, of: object = "") -> Iterator[None]:
+    """Expect a refusal of what stands within that says these parts; `of` tells which of several cases failed."""
+    said: InputError | None = None
+    try:
+        yield
+    except InputError as refusal:
+        said = refusal
+    assert said is not None, f"{of}: it is not refused"
+    missing = [part for part in parts if part not in str(said)]
+    assert not missing, f"{of}: '{said}' does not say {missing}"
+    assert parameter in (None, said.parameter), f"{of}: '{said}' is about {said.parameter}"

@@ -55,10 +55,10 @@ def campaign(
     return twin, measure(twin, runs(posture=posture), noise, rng)
 
 
-def left_over(found: AxisAnalysis, twin: Twin) -> float:
+def left_over(analysis: AxisAnalysis, twin: Twin) -> float:
     """Largest error at configurations that move every joint [m]."""
-    q = found.nominal.random_configurations(40, np.random.default_rng(9))
-    return float(errors_of(found.robot, measure(twin, q, 0.0, np.random.default_rng(0))).position_norms.max())
+    q = analysis.nominal.random_configurations(40, np.random.default_rng(9))
+    return float(errors_of(analysis.robot, measure(twin, q, 0.0, np.random.default_rng(0))).position_norms.max())
 
 
 # -- the truth comes back --------------------------------------------------------------------------------
@@ -67,30 +67,30 @@ def left_over(found: AxisAnalysis, twin: Twin) -> float:
 def test_without_noise_the_robot_is_found() -> None:
     for robot in ("irb120", "kr5", "ur5", "puma560", "lrmate200ic"):
         twin, data = campaign(robot, 0.0)
-        found = analyse(load_robot(robot), data)
-        assert left_over(found, twin) < 1e-8, robot
-        q = found.nominal.random_configurations(20, np.random.default_rng(3))
-        ours, plain = (made.world_poses(q, "3")[0] for made in (found.robot_with_errors, found.robot))
+        analysis = analyse(load_robot(robot), data)
+        assert left_over(analysis, twin) < 1e-8, robot
+        q = analysis.nominal.random_configurations(20, np.random.default_rng(3))
+        ours, plain = (arm.world_poses(q, "3")[0] for arm in (analysis.robot_with_errors, analysis.robot))
         assert_allclose(ours, plain, rtol=0, atol=1e-8, err_msg=robot)
 
 
 def test_axes_base_and_flange_are_where_the_twin_has_them() -> None:
     twin, data = campaign("irb120", 0.0)
-    found = analyse(load_robot("irb120"), data)
-    for axis, true in zip(joint_axes(found.measured.robot), joint_axes(twin.robot), strict=True):
+    analysis = analyse(load_robot("irb120"), data)
+    for axis, true in zip(joint_axes(analysis.measured.robot), joint_axes(twin.robot), strict=True):
         assert_allclose(axis.along, true.along, rtol=0, atol=1e-9)
         assert np.linalg.norm(true.nearest(axis.point) - axis.point) < 1e-9
-    axes, plain = joint_axes(twin.robot), joint_axes(found.nominal)
-    base, flange = base_and_flange(found.nominal)
+    axes, plain = joint_axes(twin.robot), joint_axes(analysis.nominal)
+    base, flange = base_and_flange(analysis.nominal)
     for (place, _, _), (first, second), nominal in (
-        (found.base, (0, 1), base),
-        (found.flange, (5, 4), flange),
+        (analysis.base, (0, 1), base),
+        (analysis.flange, (5, 4), flange),
     ):
         of_axes = np.linalg.inv(frame_between(plain[first], plain[second])) @ nominal
         expected = frame_between(axes[first], axes[second]) @ of_axes
         assert_allclose(place.rotation, expected[:3, :3], rtol=0, atol=1e-8)
         assert_allclose(place.translation, expected[:3, 3], rtol=0, atol=1e-8)
-    assert_allclose(found.robot.base.translation, found.base[0].translation, rtol=0, atol=1e-9)
+    assert_allclose(analysis.robot.base.translation, analysis.base[0].translation, rtol=0, atol=1e-9)
 
 
 def test_dh_and_s_model_of_measured_axes_are_those_of_the_true_robot() -> None:
@@ -100,10 +100,10 @@ def test_dh_and_s_model_of_measured_axes_are_those_of_the_true_robot() -> None:
     robot = replace(plain, joints=(*plain.joints[:2], third, *plain.joints[3:]), truths={})
     rng = np.random.default_rng(4)
     twin = truth_twin(robot, "random", rng)
-    found = analyse(robot, measure(twin, runs(), 0.0, rng))
+    analysis = analyse(robot, measure(twin, runs(), 0.0, rng))
     for name in ("standard-dh", "s-model"):
-        true = converted(found.framed(converted(twin.robot, "zero-reference")), name)
-        for row, joint in zip(found.table(name), true.joints, strict=True):
+        true = converted(analysis.framed(converted(twin.robot, "zero-reference")), name)
+        for row, joint in zip(analysis.table(name), true.joints, strict=True):
             for column, (value, _) in row.items():
                 assert value == pytest.approx(joint.row[column], abs=1e-7)
 
@@ -126,19 +126,19 @@ def test_stated_deviations_of_a_table_are_those_of_repetitions() -> None:
     values = []
     for _ in range(12):
         noisy = perfect.position + rng.normal(0, 2e-5, perfect.position.shape)
-        found = analyse(load_robot("irb120"), replace(perfect, position=noisy, sigma=sigma))
-        joints = converted(found.framed(found.measured.robot), "hayati").joints
+        analysis = analyse(load_robot("irb120"), replace(perfect, position=noisy, sigma=sigma))
+        joints = converted(analysis.framed(analysis.measured.robot), "hayati").joints
         values.append([joints[joint].row[column] for joint, column in wanted])
-    rows = found.table("hayati")
+    rows = analysis.table("hayati")
     assert_allclose(np.std(values, axis=0), [rows[joint][column][1] for joint, column in wanted], rtol=0.45)
 
 
 def test_noise_leaves_hundredths_of_a_millimetre() -> None:
     twin, data = campaign("irb120", 0.01e-3)
-    found = analyse(load_robot("irb120"), data)
-    assert left_over(found, twin) < 0.1e-3
-    assert found.found.excess == 1.0
-    assert found.calibrated.residual == pytest.approx(1.0, abs=0.4)
+    analysis = analyse(load_robot("irb120"), data)
+    assert left_over(analysis, twin) < 0.1e-3
+    assert analysis.found.excess == 1.0
+    assert analysis.calibrated.residual == pytest.approx(1.0, abs=0.4)
 
 
 # -- joint errors of the KR5 -----------------------------------------------------------------------------
@@ -172,8 +172,8 @@ def test_circles_see_24_sums_and_name_the_rest(kr5: Dataset) -> None:
     for name in fit.free.names:
         expected = sum(weight * true[n] for n, weight in fit.combination(name).items())
         assert fit.robot.values[name] == pytest.approx(expected, abs=1e-8)
-    held = ["ez_1 - ey_2", "ez_2 - ey_4", "ez_3 - ey_4", "ez_4 + ey_5", "ez_5 - ey_6", "ez_6"]
-    assert [r.combination for r in fit.redundancies] == held
+    fixed = ["ez_1 - ey_2", "ez_2 - ey_4", "ez_3 - ey_4", "ez_4 + ey_5", "ez_5 - ey_6", "ez_6"]
+    assert [r.combination for r in fit.redundancies] == fixed
     assert fit.moving_flange == ("ez_6",)
 
 
@@ -201,9 +201,9 @@ def test_jacobian_is_that_of_central_differences(kr5: Dataset) -> None:
     start = free.start + 1e-3
     J = problem.linearised(start)[1]
     step = 1e-6
-    for column, one in zip(J.T, np.eye(len(start)), strict=True):
-        there, back = (problem.at(start + sign * step * one).residual for sign in (1, -1))
-        assert_allclose(column, (there - back) / (2 * step), rtol=1e-5, atol=1e-4 * np.abs(J).max())
+    for column, unit in zip(J.T, np.eye(len(start)), strict=True):
+        forth, back = (problem.at(start + sign * step * unit).residual for sign in (1, -1))
+        assert_allclose(column, (forth - back) / (2 * step), rtol=1e-5, atol=1e-4 * np.abs(J).max())
 
 
 # -- what is said, and what is refused -------------------------------------------------------------------
@@ -213,32 +213,32 @@ def test_an_arm_that_gives_way_is_said_and_widens_deviations() -> None:
     rng = np.random.default_rng(2)
     twin = truth_twin(load_robot("irb120"), "nominal", rng)
     soft = replace(twin, joints={3: JointTruth(compliance=2e-4), 5: JointTruth(compliance=1e-3)})
-    stiff, bent = (analyse(load_robot("irb120"), measure(t, runs(), 5e-6, rng)) for t in (twin, soft))
+    stiff, yielding = (analyse(load_robot("irb120"), measure(t, runs(), 5e-6, rng)) for t in (twin, soft))
     assert {n.code for n in stiff.notices} == {"no-circle"}
-    assert "not-circular" in {n.code for n in bent.notices}
-    assert bent.found.excess > 1.5
-    assert bent.found.circles[0].circle.sigma == pytest.approx(5e-6 * bent.found.excess)
+    assert "not-circular" in {n.code for n in yielding.notices}
+    assert yielding.found.excess > 1.5
+    assert yielding.found.circles[0].circle.sigma == pytest.approx(5e-6 * yielding.found.excess)
 
 
 def test_undeclared_noise_is_found_from_what_the_circles_leave() -> None:
     _, data = campaign("irb120", 0.03e-3)
-    found = axis_circles(replace(data, sigma=None))
-    assert not found.declared
-    assert found.circles[0].circle.sigma == pytest.approx(0.03e-3, rel=0.05)
+    circles = axis_circles(replace(data, sigma=None))
+    assert not circles.declared
+    assert circles.circles[0].circle.sigma == pytest.approx(0.03e-3, rel=0.05)
     # a target on the axis is left out if there are others
     _, data = campaign("irb120", 0.02e-3)
-    found = axis_circles(data)
-    assert {c.target for c in found.circles if c.joint == 6} == {"2", "3"}
-    assert all("joint 6, target 1" in str(refusal) for refusal in found.refused)
+    circles = axis_circles(data)
+    assert {c.target for c in circles.circles if c.joint == 6} == {"2", "3"}
+    assert all("joint 6, target 1" in str(refusal) for refusal in circles.refused)
 
 
 def test_poses_that_belong_to_no_run_are_counted() -> None:
     rng = np.random.default_rng(3)
     twin = truth_twin(load_robot("irb120"), "nominal", rng)
     outlying = load_robot("irb120").random_configurations(4, rng)
-    found = analyse(load_robot("irb120"), measure(twin, np.concatenate([runs(), outlying]), 1e-5, rng))
-    assert found.found.left_out == 4
-    assert "left-out" in {n.code for n in found.notices}
+    analysis = analyse(load_robot("irb120"), measure(twin, np.concatenate([runs(), outlying]), 1e-5, rng))
+    assert analysis.found.left_out == 4
+    assert "left-out" in {n.code for n in analysis.notices}
 
 
 def test_what_cannot_be_used_is_refused() -> None:
@@ -249,7 +249,7 @@ def test_what_cannot_be_used_is_refused() -> None:
     )
     data = measure(twin, runs(), 1e-5, rng)
     refused(None, "other joints than katana450.*allowed: 5", analyse, load_robot("katana450"), data)
-    for wrong, told in (
+    for wrong, words in (
         (few, "no run of joint 5, 6"),
         (outlying, "one joint moves alone"),
         (replace(data, joints=data.joints * [1, 1, 1, -1, 1, 1]), "joint 4 does not turn as the robot file says"),
@@ -259,7 +259,7 @@ def test_what_cannot_be_used_is_refused() -> None:
         ),
         (replace(data, joint_kinds=(*data.joint_kinds[:5], "prismatic")), "joint 6: a joint that slides"),
     ):
-        refused(None, told, analyse, load_robot("irb120"), wrong)
+        refused(None, words, analyse, load_robot("irb120"), wrong)
 
 
 # -- runs and turns ------------------------------------------------------------------------------------------------

@@ -41,40 +41,42 @@ def data() -> Dataset:
 
 
 @pytest.fixture(scope="module")
-def found(data: Dataset) -> AxisCalibration:
+def calibration(data: Dataset) -> AxisCalibration:
     return package.axes("kr5", data, measurement_frame="robot")
 
 
-def test_axes_are_the_same_from_objects_and_from_files(found: AxisCalibration, data: Dataset, tmp_path: Path) -> None:
+def test_axes_are_the_same_from_objects_and_from_files(
+    calibration: AxisCalibration, data: Dataset, tmp_path: Path
+) -> None:
     (tmp_path / "axes.csv").write_text(csv_text(data))
     read = package.axes("kr5", tmp_path / "axes.csv", measurement_frame="robot", out=tmp_path / "out")
     assert {p.name for p in (tmp_path / "out").iterdir()} == {*AXIS_FILES, MANIFEST}
     assert json.loads((tmp_path / "out" / "axes.json").read_text()) == read.summary()
-    values = found.robot_with_errors.values
+    values = calibration.robot_with_errors.values
     assert read.robot_with_errors.values == pytest.approx(values, abs=1e-9)
     assert package.load_robot(tmp_path / "out" / "joint-errors.yaml").values == pytest.approx(values, abs=1e-9)
 
 
-def test_axes_say_what_circles_do_not_observe(found: AxisCalibration) -> None:
-    said = found.summary()
-    assert [c["joint"] for c in said["circles"]] == [1, 2, 3, 4, 5, 6]
-    assert len(said["joint_errors"]["found"]) == 24
-    assert [e["name"] for e in said["joint_errors"]["unseen"] if e["moves_flange"]] == ["ez_6"]
-    errors = {e["name"]: e for e in said["joint_errors"]["found"]}
+def test_axes_say_what_circles_do_not_observe(calibration: AxisCalibration) -> None:
+    summary = calibration.summary()
+    assert [c["joint"] for c in summary["circles"]] == [1, 2, 3, 4, 5, 6]
+    assert len(summary["joint_errors"]["found"]) == 24
+    assert [e["name"] for e in summary["joint_errors"]["unseen"] if e["moves_flange"]] == ["ez_6"]
+    errors = {e["name"]: e for e in summary["joint_errors"]["found"]}
     assert errors["ebeta_2"]["value"] == pytest.approx(0.1813, abs=0.005)
     assert errors["ebeta_2"]["interval"][0] < errors["ebeta_2"]["value"] < errors["ebeta_2"]["interval"][1]
-    text = found.lines()
-    held = text[text.index("Unobservable with circles, and held at their nominal values:") + 1 :]
-    assert [line.strip() for line in held if line.endswith("(moves the flange)")] == ["ez_6 (moves the flange)"]
-    assert len(repr(found)) <= 2000
+    text = calibration.lines()
+    fixed = text[text.index("Unobservable with circles, and held at their nominal values:") + 1 :]
+    assert [line.strip() for line in fixed if line.endswith("(moves the flange)")] == ["ez_6 (moves the flange)"]
+    assert len(repr(calibration)) <= 2000
 
 
-def test_tolerances_of_one_depth_are_those_of_the_same_depth_each(found: AxisCalibration) -> None:
-    robot = found.robot_with_errors
-    one, each = package.tolerance(robot, 0.05), package.tolerance(robot, [0.05] * 6)
-    assert isinstance(one, UsedTolerances)
-    assert one.summary() == each.summary()
-    assert one.joints[1].delta == pytest.approx(0.05 * np.tan(np.radians(0.1814)), abs=1e-5)
+def test_tolerances_of_one_depth_are_those_of_the_same_depth_each(calibration: AxisCalibration) -> None:
+    robot = calibration.robot_with_errors
+    single, each = package.tolerance(robot, 0.05), package.tolerance(robot, [0.05] * 6)
+    assert isinstance(single, UsedTolerances)
+    assert single.summary() == each.summary()
+    assert single.joints[1].delta == pytest.approx(0.05 * np.tan(np.radians(0.1814)), abs=1e-5)
     allowed = package.tolerance(robot, 0.05, lean=2e-5, position=(1e-4, 0, 0, 0, 0, 0))
     assert isinstance(allowed, AllowedErrors)
     worst, root = allowed.errors.together
@@ -82,7 +84,7 @@ def test_tolerances_of_one_depth_are_those_of_the_same_depth_each(found: AxisCal
     assert f"all at their worst {worst * 1e3:.3f} mm" in repr(allowed)
 
 
-def test_lines_are_planned_tried_and_judged(found: AxisCalibration, tmp_path: Path) -> None:
+def test_lines_are_planned_tried_and_judged(calibration: AxisCalibration, tmp_path: Path) -> None:
     plan = package.lines("kr5", CENTRE, out=tmp_path / "plan.csv")
     assert plan.summary() == {"poses": 77, "lines": []}
     assert plan.lines() == ["The robot can go to all 77 poses."]
@@ -90,18 +92,18 @@ def test_lines_are_planned_tried_and_judged(found: AxisCalibration, tmp_path: Pa
     rows = (tmp_path / "plan.csv").read_text().splitlines()
     assert rows[0].startswith("configuration,joint_1 [deg],")
     assert np.radians([float(cell) for cell in rows[1].split(",")[1:]]) == pytest.approx(plan.joints[0])
-    tried = package.lines("kr5", CENTRE, joint_errors=found.robot_with_errors, truth="axis-tests", noise=1e-5)
+    tried = package.lines("kr5", CENTRE, joint_errors=calibration.robot_with_errors, truth="axis-tests", noise=1e-5)
     assert tried.compensated
     assert np.abs(tried.joints - plan.joints).max() > 1e-4
     assert min(line["reduction_percent"] for line in tried.summary()["lines"]) > 95.0
     assert len(tried.lines()) == 8
 
 
-def test_measured_lines_are_judged_by_the_frames_of_the_joint_errors(found: AxisCalibration) -> None:
+def test_measured_lines_are_judged_by_the_frames_of_the_joint_errors(calibration: AxisCalibration) -> None:
     plan = package.lines("kr5", CENTRE)
     position = stands().world_poses(plan.joints, "smr")[0]
     data = Dataset.of(plan.joints, position, targets=["smr"], configurations=plan.poses.labels)
-    judged = package.lines("kr5", CENTRE, joint_errors=found.robot_with_errors, data=data)
+    judged = package.lines("kr5", CENTRE, joint_errors=calibration.robot_with_errors, data=data)
     largest = known(judged.before).largest("xyz")
     assert judged.after is None
     assert judged.summary()["lines"][0].keys() >= {"direction", "before_mm"}
@@ -139,9 +141,9 @@ tolerance: Callable[..., Any] = partial(package.tolerance, "kr5")
 lines: Callable[..., Any] = partial(package.lines, "kr5")
 
 
-def test_refusals_name_the_parameter(found: AxisCalibration, data: Dataset, tmp_path: Path) -> None:
-    given = data.of_configurations(range(30))
-    refused(None, "there is no frame of this name", axes, given, measurement_frame="table")
+def test_refusals_name_the_parameter(calibration: AxisCalibration, data: Dataset, tmp_path: Path) -> None:
+    some = data.of_configurations(range(30))
+    refused(None, "there is no frame of this name", axes, some, measurement_frame="table")
     refused("depth", "6 numbers belong here", tolerance, "deep")
     refused("depth", "a hole needs a depth", tolerance, 0.0)
     refused("depth", "the number cannot be used", tolerance, float("nan"))
@@ -164,7 +166,7 @@ def test_refusals_name_the_parameter(found: AxisCalibration, data: Dataset, tmp_
     refused(
         None, "axes determine nothing of the robot", axes, replace(data, position=shifted), measurement_frame="robot"
     )
-    found.save(tmp_path)
+    calibration.save(tmp_path)
     errors = tmp_path / "joint-errors.yaml"
     before = errors.read_bytes()
     refused("out", "this file is read", lines, CENTRE, joint_errors=errors, out=errors)

@@ -22,9 +22,9 @@ OF_JOINTS = joint_messages(TIMES, JOINTS)
 OF_TARGET = target_messages(SEEN, POSITIONS, TURNS)
 
 
-def refused(bag: Path, words: str, **how: object) -> InputError:
+def refused(bag: Path, words: str, **options: object) -> InputError:
     with pytest.raises(InputError, match=words) as refusal:
-        truearm.import_ros(bag, **how)  # type: ignore[arg-type]
+        truearm.import_ros(bag, **options)  # type: ignore[arg-type]
     return refusal.value
 
 
@@ -59,7 +59,7 @@ def test_deviation_of_the_mean_counts_that_samples_are_alike() -> None:
     times = np.arange(stops * n, dtype=float) / 20.0
     stills = [Standstill(20.0 * i, 20.0 * i + 19.96, np.zeros(6), 0.0) for i in range(stops)]
     stream = TargetStream("tip", "/tip", times, series.reshape(-1, 3), None, "tracker", 0)
-    sigmas = [one.sigma for one in seen_at(stills, stream, 0.0)]
+    sigmas = [sighting.sigma for sighting in seen_at(stills, stream, 0.0)]
     true = 1e-4 * np.sqrt(9.0 / n)
     assert np.mean(sigmas) == pytest.approx(true, rel=0.15)
     means = series.mean(axis=1)
@@ -152,8 +152,8 @@ def test_pauses_that_are_no_standstills_are_said(tmp_path: Path) -> None:
 
 def with_lost(share: float, stand: float, rate: float = 100.0, seed: int = 3) -> JointStream:
     times, joints, *_ = recorded(stand=stand, joint_rate=rate, seed=seed)
-    kept = np.random.default_rng(seed).random(len(times)) >= share
-    return JointStream("/joint_states", NAMES, times[kept] - times[kept][0], joints[kept], 0)
+    received = np.random.default_rng(seed).random(len(times)) >= share
+    return JointStream("/joint_states", NAMES, times[received] - times[received][0], joints[received], 0)
 
 
 def test_lost_messages_do_not_tear_a_standstill() -> None:
@@ -191,8 +191,10 @@ def test_a_stop_that_the_arm_may_have_left_between_messages_is_two() -> None:
 
 
 def test_missing_messages_are_told(tmp_path: Path) -> None:
-    kept = np.random.default_rng(0).random(len(TIMES)) >= 0.3
-    read = truearm.import_ros(write_ros2(tmp_path / "cell", [*joint_messages(TIMES[kept], JOINTS[kept]), *OF_TARGET]))
+    received = np.random.default_rng(0).random(len(TIMES)) >= 0.3
+    read = truearm.import_ros(
+        write_ros2(tmp_path / "cell", [*joint_messages(TIMES[received], JOINTS[received]), *OF_TARGET])
+    )
     assert read.data.configurations == 5
     assert [(notice.code, notice.level) for notice in read.warnings] == [("messages-missing", "warning")]
     assert f"of {len(TIMES)} messages of the joints are missing" in str(read.lines())

@@ -60,12 +60,12 @@ VIEWS = 30
 @cache
 def campaign(on_flange: str, seed: int, scale: float = 1.0) -> tuple[Cell, Array, Array, Array]:
     """Return a cell, 30 configurations and where the board is in them by corners that are off by 0.3 px, 40 unseen."""
-    there, rng = cell(seed, on_flange), np.random.default_rng(100 + seed)
-    q = configurations(there, VIEWS + 40, rng)
-    true = there.views(q[:VIEWS])
+    seen_cell, rng = cell(seed, on_flange), np.random.default_rng(100 + seed)
+    q = configurations(seen_cell, VIEWS + 40, rng)
+    true = seen_cell.views(q[:VIEWS])
     corners = projected(true, scale) + PX * rng.standard_normal((VIEWS, BOARD.corners, 2))
     views, sigma, sigma_rot = poses_of(corners, true, PX)
-    return there, q, views, np.array([sigma, sigma_rot])
+    return seen_cell, q, views, np.array([sigma, sigma_rot])
 
 
 def imported(folder: Path, on_flange: str, seed: int, scale_sigma: float | None = None) -> ImportedHandEye:
@@ -75,18 +75,18 @@ def imported(folder: Path, on_flange: str, seed: int, scale_sigma: float | None 
     return truearm.import_hand_eye(path, on_flange=on_flange, scale_sigma=scale_sigma)  # type: ignore[arg-type]
 
 
-def seen_from_the_other(there: Cell, joints: Array) -> Array:
+def seen_from_the_other(seen_cell: Cell, joints: Array) -> Array:
     """Return the true place of what is on the flange, from what stands beside the robot, ``(n, 4, 4)``."""
-    return np.asarray(np.linalg.inv(there.beside) @ there.twin.frames(joints)[there.on_flange])
+    return np.asarray(np.linalg.inv(seen_cell.beside) @ seen_cell.twin.frames(joints)[seen_cell.on_flange])
 
 
-def without_gauge(found: Array, true: Array) -> Array:
+def without_gauge(frame: Array, true: Array) -> Array:
     """Return a frame turned about z and moved along it, on the left, so that it fits another one best."""
-    D = true[:3, :3] @ found[:3, :3].T
+    D = true[:3, :3] @ frame[:3, :3].T
     angle = np.arctan2(D[1, 0] - D[0, 1], D[0, 0] + D[1, 1])
     G = np.eye(4)
     G[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    moved = G @ found
+    moved = G @ frame
     moved[2, 3] = true[2, 3]
     return np.asarray(moved)
 
@@ -107,33 +107,33 @@ def behind_axis_6(robot: Robot, target: str, ahead: float) -> Array:
 
 @pytest.mark.parametrize(("on_flange", "seed"), [("camera", 0), ("board", 1)])
 def test_robot_mount_and_the_other_one_are_found_together(on_flange: str, seed: int, tmp_path: Path) -> None:
-    there, q, _, _ = campaign(on_flange, seed)
+    seen_cell, q, _, _ = campaign(on_flange, seed)
     read = imported(tmp_path, on_flange, seed)
     fit = identify(UR5E, read.data, GEOMETRIC)
     assert fit.status is Status.CONVERGED
     assert fit.excess == 1.0  # the deviations are what the corners leave
     unseen, base = q[VIEWS:], product(fit.robot.base_elements, fit.robot)
-    other = without_gauge(np.asarray(np.linalg.inv(base)), there.beside)  # in the base: what theta_1 and d_1 leave
+    other = without_gauge(np.asarray(np.linalg.inv(base)), seen_cell.beside)  # in the base: what theta_1 and d_1 leave
     in_base = other @ frames(fit.robot, unseen, on_flange, read.ahead)
-    assert errors(in_base, there.twin.frames(unseen)[on_flange])[0] < 0.2e-3
-    assert errors(other[None], there.beside[None])[0] < 0.2e-3
-    true_mount = behind_axis_6(there.twin.robot, on_flange, 0.0)
+    assert errors(in_base, seen_cell.twin.frames(unseen)[on_flange])[0] < 0.2e-3
+    assert errors(other[None], seen_cell.beside[None])[0] < 0.2e-3
+    true_mount = behind_axis_6(seen_cell.twin.robot, on_flange, 0.0)
     mount = without_gauge(behind_axis_6(fit.robot, on_flange, read.ahead), true_mount)
     apart, turned = errors(mount[None], true_mount[None])
     assert (apart < 0.2e-3, turned < 1e-3) == (True, True)
-    nominal = errors(frames(fit.start, unseen, on_flange, read.ahead), seen_from_the_other(there, unseen))
-    ours = errors(frames(fit.robot, unseen, on_flange, read.ahead), seen_from_the_other(there, unseen))
+    nominal = errors(frames(fit.start, unseen, on_flange, read.ahead), seen_from_the_other(seen_cell, unseen))
+    ours = errors(frames(fit.robot, unseen, on_flange, read.ahead), seen_from_the_other(seen_cell, unseen))
     assert ours[0] < 0.1 * nominal[0]
 
 
 @pytest.mark.parametrize(("on_flange", "seed"), [("camera", 0), ("board", 1)])
 def test_it_is_better_than_opencv_with_the_robot_as_it_is_named(on_flange: str, seed: int, tmp_path: Path) -> None:
     cv2 = pytest.importorskip("cv2", reason="OpenCV (truearm[vision]) is not installed")
-    there, q, views, _ = campaign(on_flange, seed)
+    seen_cell, q, views, _ = campaign(on_flange, seed)
     read = imported(tmp_path, on_flange, seed)
     fit = identify(UR5E, read.data, GEOMETRIC)
     unseen = q[VIEWS:]
-    true = seen_from_the_other(there, unseen)
+    true = seen_from_the_other(seen_cell, unseen)
 
     def by_opencv(robot: Robot) -> float:
         bare = robot.with_frames(Transform(), {"flange": Transform()})
@@ -157,7 +157,7 @@ def test_it_is_better_than_opencv_with_the_robot_as_it_is_named(on_flange: str, 
 
 
 def test_a_scale_that_is_not_known_exactly_is_a_parameter(tmp_path: Path) -> None:
-    there, q, views, (sigma, sigma_rot) = campaign("camera", 2, 1.002)
+    seen_cell, q, views, (sigma, sigma_rot) = campaign("camera", 2, 1.002)
     path = tmp_path / "views.csv"
     path.write_text(table_of(q[:VIEWS], views, sigma, sigma_rot))
     exact = truearm.import_hand_eye(path, on_flange="camera").data
@@ -175,14 +175,14 @@ def test_a_scale_that_is_not_known_exactly_is_a_parameter(tmp_path: Path) -> Non
     again = read_csv(_written(tmp_path / "data.csv", csv_text(loose)))
     assert again.scale_sigma == 5e-3
     assert csv_text(again) == csv_text(loose)
-    kept = read_robot(_written(tmp_path / "robot.yaml", robot_text(doubting.robot)))
-    assert kept.parameters["instrument_scale"] == scale
-    with_it, without = (errors_of(kept, d).position_norms.mean() for d in (again, exact))
+    stored = read_robot(_written(tmp_path / "robot.yaml", robot_text(doubting.robot)))
+    assert stored.parameters["instrument_scale"] == scale
+    with_it, without = (errors_of(stored, d).position_norms.mean() for d in (again, exact))
     assert with_it < without
     # an instrument whose scale is exact leaves none behind
-    assert "instrument_scale" not in identify(kept, exact, GEOMETRIC).robot.parameters
+    assert "instrument_scale" not in identify(stored, exact, GEOMETRIC).robot.parameters
     assert "instrument_scale" not in identify(UR5E, loose, GEOMETRIC, redundancy="drop").free.names
-    assert there.on_flange == "camera"
+    assert seen_cell.on_flange == "camera"
 
 
 def test_the_scale_moves_readings_as_its_derivative_says() -> None:
@@ -202,40 +202,40 @@ def test_the_scale_moves_readings_as_its_derivative_says() -> None:
     np.testing.assert_allclose(many[0], problem.residual(at), rtol=0, atol=1e-15)
 
 
-def aligned(there: Cell, robot: Robot, joints: Array, ahead: float) -> float:
+def aligned(seen_cell: Cell, robot: Robot, joints: Array, ahead: float) -> float:
     """Return the mean error behind a rigid motion [m]: what the lens is wrong by is where the camera seems to be."""
-    true = seen_from_the_other(there, joints)[:, :3, 3]
-    found = frames(robot, joints, there.on_flange, ahead)[:, :3, 3]
-    R, t = rigid_motion(found, true)
-    return float(np.linalg.norm(found @ R.T + t - true, axis=1).mean())
+    true = seen_from_the_other(seen_cell, joints)[:, :3, 3]
+    positions = frames(robot, joints, seen_cell.on_flange, ahead)[:, :3, 3]
+    R, t = rigid_motion(positions, true)
+    return float(np.linalg.norm(positions @ R.T + t - true, axis=1).mean())
 
 
 @pytest.mark.parametrize("on_flange", ["camera", "board"])
 def test_pictures_calibrate_the_lens_and_the_robot(on_flange: str, tmp_path: Path) -> None:
     pytest.importorskip("cv2", reason="OpenCV (truearm[vision]) is not installed")
-    there, rng = cell(3, on_flange), np.random.default_rng(1)
-    q = configurations(there, 30, rng)
+    seen_cell, rng = cell(3, on_flange), np.random.default_rng(1)
+    q = configurations(seen_cell, 30, rng)
     size = (SIZE[0] // 3, SIZE[1] // 3)
     lens = np.array([[770.0, 0.0, size[0] / 2 + 4], [0.0, 771.0, size[1] / 2 - 3], [0.0, 0.0, 1.0]])
-    bent = np.array([-0.08, 0.03, 4e-4, -3e-4, 0.0])
-    pictures(tmp_path, there.views(q[:12]), rng, size, lens, bent)
+    distortion = np.array([-0.08, 0.03, 4e-4, -3e-4, 0.0])
+    pictures(tmp_path, seen_cell.views(q[:12]), rng, size, lens, distortion)
     table = _written(tmp_path / "views.csv", table_of_pictures(q[:12]))
     read = truearm.import_hand_eye(table, on_flange=on_flange, board=PICTURED_TEXT)  # type: ignore[arg-type]
-    found = known(read.lens)
-    assert found.noise < 0.3
+    lens_found = known(read.lens)
+    assert lens_found.noise < 0.3
     true = {"fx": 770.0, "fy": 771.0, "cx": lens[0, 2], "cy": lens[1, 2], "k1": -0.08, "p1": 4e-4, "p2": -3e-4}
     for name, value in true.items():
-        assert abs(found.values[name] - value) < 4.0 * found.deviations[name], name
-    assert found.deviations["fx"] < 2.0
-    kept = read_hand_eye(table, on_flange, PICTURED).views  # type: ignore[arg-type]
-    apart = kept.position - there.views(q[:12])[:, :3, 3]  # the lens is a little long or short in all of them
+        assert abs(lens_found.values[name] - value) < 4.0 * lens_found.deviations[name], name
+    assert lens_found.deviations["fx"] < 2.0
+    views = read_hand_eye(table, on_flange, PICTURED).views  # type: ignore[arg-type]
+    apart = views.position - seen_cell.views(q[:12])[:, :3, 3]  # the lens is a little long or short in all of them
     assert np.ptp(apart, axis=0).max() < 4e-3
     fit = identify(UR5E, read.data, GEOMETRIC)
     unseen = q[12:]
-    assert aligned(there, fit.robot, unseen, read.ahead) < 0.35 * aligned(there, fit.start, unseen, read.ahead)
+    assert aligned(seen_cell, fit.robot, unseen, read.ahead) < 0.35 * aligned(seen_cell, fit.start, unseen, read.ahead)
     text = "\n".join(read.lines())
     assert ("12 configurations, target" in text, "lens: fx 7" in text) == (True, True)
-    assert read.summary()["lens"]["noise_px"] == found.noise
+    assert read.summary()["lens"]["noise_px"] == lens_found.noise
 
 
 def test_the_point_before_the_camera_is_known_better_than_the_camera(tmp_path: Path) -> None:
@@ -337,13 +337,13 @@ def test_a_table_that_does_not_fit_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_scale_is_one_for_a_file(tmp_path: Path) -> None:
-    made = tmp_path / "data.csv"
-    truearm.import_hand_eye(**example(tmp_path, scale_sigma=2e-4), out=made)
-    made.write_text(made.read_text().replace(",200.0\n", ",100.0\n", 1))
+    data_file = tmp_path / "data.csv"
+    truearm.import_hand_eye(**example(tmp_path, scale_sigma=2e-4), out=data_file)
+    data_file.write_text(data_file.read_text().replace(",200.0\n", ",100.0\n", 1))
     words = r"line 3, column scale_sigma \[ppm\]: the scale is of the instrument, .*one of"
-    refused(None, words, truearm.load_data, made)
-    made.write_text(made.read_text().replace("[ppm]", "[mm]"))
-    refused(None, r"this unit does not fit here; got 'mm'; allowed: ppm", truearm.load_data, made)
+    refused(None, words, truearm.load_data, data_file)
+    data_file.write_text(data_file.read_text().replace("[ppm]", "[mm]"))
+    refused(None, r"this unit does not fit here; got 'mm'; allowed: ppm", truearm.load_data, data_file)
 
 
 # -- boards ------------------------------------------------------------------------------------------------
@@ -379,10 +379,10 @@ def table(folder: Path, count: int, joints: str = "10,20") -> Path:
 
 
 def some_views(count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    made = np.tile(np.eye(4), (count, 1, 1))
-    made[:, :3, :3] = rotation_from_vector(np.random.default_rng(0).uniform(-0.6, 0.6, (count, 3)))
-    made[:, 2, 3] = 0.45
-    return made
+    frames_of_board = np.tile(np.eye(4), (count, 1, 1))
+    frames_of_board[:, :3, :3] = rotation_from_vector(np.random.default_rng(0).uniform(-0.6, 0.6, (count, 3)))
+    frames_of_board[:, 2, 3] = 0.45
+    return frames_of_board
 
 
 def rendered(folder: Path, count: int = 8) -> Path:
@@ -415,8 +415,8 @@ def test_pictures_that_do_not_show_the_board_are_refused(tmp_path: Path) -> None
     wrong(r"1\.png: this is another board: its markers are of another dictionary; got '4X4_", "8x6,40mm,30mm,6X6_50")
     wrong(r"1\.png: (too few corners|the corners do not fit the board|the board is not seen)", "7x9,40mm,30mm,4X4_50")
     wrong(r"1\.png: columns and rows of the board are exchanged; got '6x8'; allowed: 8x6", "6x8,40mm,30mm,4X4_50")
-    kept = {k: (tmp_path / f"{k}.png").read_bytes() for k in (1, 2, 3)}
-    small = cv2.imdecode(np.frombuffer(kept[2], np.uint8), cv2.IMREAD_GRAYSCALE)
+    contents = {k: (tmp_path / f"{k}.png").read_bytes() for k in (1, 2, 3)}
+    small = cv2.imdecode(np.frombuffer(contents[2], np.uint8), cv2.IMREAD_GRAYSCALE)
     cv2.imwrite(str(tmp_path / "2.png"), small[:300])
     wrong(r"2\.png: the pictures are not of one size; got '480 x 300 px'; allowed: 480 x 360 px, as 1\.png")
     cv2.imwrite(str(tmp_path / "2.png"), np.full_like(small, 128))
@@ -437,8 +437,8 @@ def test_a_board_of_other_squares_does_not_fit(tmp_path: Path) -> None:
 
     image = cv2.imread(str(tmp_path / "3.png"), cv2.IMREAD_GRAYSCALE)
     u, v = np.meshgrid(np.arange(480, dtype=np.float32), np.arange(360, dtype=np.float32))
-    bent = cv2.remap(image, u, (v + 25 * np.sin(u / 60)).astype(np.float32), cv2.INTER_LINEAR, borderValue=150.0)
-    cv2.imwrite(str(tmp_path / "3.png"), bent)
+    warped = cv2.remap(image, u, (v + 25 * np.sin(u / 60)).astype(np.float32), cv2.INTER_LINEAR, borderValue=150.0)
+    cv2.imwrite(str(tmp_path / "3.png"), warped)
     words = r"\d\.png: the corners do not fit the board: it is another board, bent, or was"
     refused(None, words, truearm.import_hand_eye, path, on_flange="camera", board=PICTURED_TEXT)
 
@@ -446,8 +446,8 @@ def test_a_board_of_other_squares_does_not_fit(tmp_path: Path) -> None:
 def test_every_dictionary_is_one_of_opencv() -> None:
     cv2 = pytest.importorskip("cv2", reason="OpenCV (truearm[vision]) is not installed")
     for name, count in DICTIONARIES.items():
-        found = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}"))
-        assert len(found.bytesList) == count, name
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}"))
+        assert len(dictionary.bytesList) == count, name
     assert PICTURED.dictionary in DICTIONARIES
 
 

@@ -30,18 +30,18 @@ def run(train: int | None = None) -> Calibration:
 
 
 def test_residuals_are_the_errors_reading_by_reading() -> None:
-    found = run(28).residuals()
+    result = run(28).residuals()
     data = run(28).data
-    assert len(found) == len(data.target)
-    assert np.unique(found.part, return_counts=True)[1].tolist() == [12 * 3, 28 * 3]
+    assert len(result) == len(data.target)
+    assert np.unique(result.part, return_counts=True)[1].tolist() == [12 * 3, 28 * 3]
     errors = errors_of(run(28).fit.robot, data).position_errors
     places = zip(data.configuration, data.target, errors, strict=True)
     expected = {(data.labels[c], data.targets[t]): error for c, t, error in places}
-    for row in found:
+    for row in result:
         np.testing.assert_allclose(row.error, expected[row.configuration, row.target], rtol=0, atol=1e-15)
         assert row.norm == pytest.approx(float(np.linalg.norm(row.error)))
     held_out = {data.labels[i] for i in run(28).held_out}
-    assert {row.configuration for row in found if row.part == "held out"} == held_out
+    assert {row.configuration for row in result if row.part == "held out"} == held_out
 
 
 def test_without_a_held_out_part_all_residuals_are_of_training() -> None:
@@ -54,10 +54,10 @@ def test_residuals_as_a_data_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     pandas = ModuleType("pandas")
     pandas.DataFrame = dict  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "pandas", pandas)
-    found = run(28).residuals()
-    frame: dict[str, Any] = found.to_pandas()
+    result = run(28).residuals()
+    frame: dict[str, Any] = result.to_pandas()
     assert list(frame) == ["configuration", "target", "part", "kind", "ex", "ey", "ez", "norm"]
-    np.testing.assert_array_equal(frame["ez"], found.error[:, 2])
+    np.testing.assert_array_equal(frame["ez"], result.error[:, 2])
 
 
 def test_the_text_is_what_the_command_prints_and_is_short() -> None:
@@ -70,14 +70,14 @@ def test_the_text_is_what_the_command_prints_and_is_short() -> None:
 
 
 def test_the_report_of_the_fit_has_a_line_for_every_parameter() -> None:
-    found = run(28)
-    a_3 = found.parameters["a_3"]
+    result = run(28)
+    a_3 = result.parameters["a_3"]
     assert 0.0 < known(a_3.deviation) < 1e-4
     assert abs(a_3.value - 0.27) < 5e-4
-    text = str(found)
-    assert text.startswith("\n".join(found.lines()))
-    rows = text.splitlines()[len(found.lines()) + 1 :]
-    assert [row.split()[0] for row in rows] == ["parameter", *found.parameters]
+    text = str(result)
+    assert text.startswith("\n".join(result.lines()))
+    rows = text.splitlines()[len(result.lines()) + 1 :]
+    assert [row.split()[0] for row in rows] == ["parameter", *result.parameters]
     assert re.search(r"^a_3 +270\.000 +2[67]\d\.\d+ +[+-]?\d\.\d+  mm$", text, re.M)
     assert re.search(r"^a_1 .*not told by the data$", text, re.M)
 
@@ -111,8 +111,8 @@ def test_the_error_to_expect_stands_beside_the_held_out_one() -> None:
     bound = replace(run(28), expected=replace(run(28).expected, omissions=("values at a bound count as exact",)))
     assert "  may be larger: values at a bound count as exact" in bound.lines()
     (line,) = (line for line in bound.lines() if line.startswith(begin[:-3]))
-    for words, there in ((" mm (90 %: ", True), (" or more), 95 % ", True), ("95 % below", False)):
-        assert (words in line) is there, words
+    for words, is_shown in ((" mm (90 %: ", True), (" or more), 95 % ", True), ("95 % below", False)):
+        assert (words in line) is is_shown, words
     assert bound.summary()["expected_mm"]["interval_90"][1] is None
     assert bound.summary()["expected_mm"]["lower_bound"] is True
 
@@ -145,8 +145,8 @@ def csv(tmp_path: Path) -> Path:
 
 def test_what_is_left_out_changes_nothing(csv: Path, tmp_path: Path) -> None:
     out = package.calibrate("irb120", csv, model="offsets", without=["3", "7"])
-    kept = [i for i, label in enumerate(DATA.labels) if label not in ("3", "7")]
-    alone = package.calibrate("irb120", DATA.of_configurations(kept), model="offsets")
+    rows = [i for i, label in enumerate(DATA.labels) if label not in ("3", "7")]
+    alone = package.calibrate("irb120", DATA.of_configurations(rows), model="offsets")
     for name, value in alone.fit.robot.values.items():
         assert out.fit.robot.values[name] == pytest.approx(value, abs=1e-7)
     assert out.summary()["without"] == ["3", "7"]
@@ -166,8 +166,10 @@ def test_what_is_left_out_changes_nothing(csv: Path, tmp_path: Path) -> None:
 
 def test_the_command_takes_lists_repeats_and_notes(truearm: Truearm, csv: Path, tmp_path: Path) -> None:
     words = ["calibrate", "irb120", csv, "--model", "offsets", "--out", tmp_path / "r", "--json"]
-    done = truearm(*words, "--without", "3, 7", "--without", "9", "--note", "serial=120-<7>", "--note", "operator=A B")
-    assert json.loads(done.out)["without"] == ["3", "7", "9"]
+    outcome = truearm(
+        *words, "--without", "3, 7", "--without", "9", "--note", "serial=120-<7>", "--note", "operator=A B"
+    )
+    assert json.loads(outcome.out)["without"] == ["3", "7", "9"]
     assert json.loads((tmp_path / "r" / "result.json").read_text())["notes"] == {"serial": "120-<7>", "operator": "A B"}
     page = (tmp_path / "r" / "report.html").read_text()
     assert "120-&lt;7&gt;" in page
@@ -184,7 +186,7 @@ def test_what_cannot_be_left_out_or_noted_is_refused() -> None:
     words = "there is no configuration of this name.*Did you mean 24"
     refused("without", words, calibrate, without=["241"])
     refused(None, "no configuration would be left", calibrate, without=DATA.labels)
-    for notes, what in (
+    for notes, fault in (
         ({"serial": ""}, "a name and a text of one line"),
         ({"serial": "1\n2"}, "a name and a text of one line"),
         ({"serial": "1" * 201}, "a name and a text of one line"),
@@ -192,4 +194,4 @@ def test_what_cannot_be_left_out_or_noted_is_refused() -> None:
         (["serial=1"], "notes by name belong here"),
         ({str(i): "1" for i in range(21)}, "too many notes"),
     ):
-        refused("notes", what, calibrate, notes=notes)
+        refused("notes", fault, calibrate, notes=notes)

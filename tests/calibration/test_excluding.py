@@ -52,20 +52,20 @@ def _file(folder: Path, *rows: tuple[str, str, str]) -> Path:
 
 def test_excluded_readings_count_as_missing_and_the_split_stays(csv: Path, tmp_path: Path) -> None:
     file = _file(tmp_path, (TRAINING[0], "1", "beam, broken"), (HELD_OUT[0], "2", "touched"))
-    found = calibrate("irb120", csv, model="offsets", exclude=file, out=tmp_path / "result")
+    result = calibrate("irb120", csv, model="offsets", exclude=file, out=tmp_path / "result")
     plain = calibrate("irb120", csv, model="offsets")
-    assert np.array_equal(found.held_out, plain.held_out)
+    assert np.array_equal(result.held_out, plain.held_out)
     position = DATA.position.copy()
     position[_rows(DATA, TRAINING[0], "1")] = np.nan
     emptied = calibrate("irb120", replace(DATA, position=position), model="offsets")
     for name, value in emptied.fit.robot.values.items():
-        assert found.fit.robot.values[name] == pytest.approx(value, abs=1e-7)
+        assert result.fit.robot.values[name] == pytest.approx(value, abs=1e-7)
 
-    said = "Excluded: 2 readings (1 of the training part, 1 of the held-out part): beam, broken (1), touched (1)"
-    assert said in found.lines()
-    assert " 2 readings excluded, redundancy" in found.history
-    assert f"exclude='{file}'" in found.command
-    assert "missing" not in [one.code for one in found.warnings]
+    words = "Excluded: 2 readings (1 of the training part, 1 of the held-out part): beam, broken (1), touched (1)"
+    assert words in result.lines()
+    assert " 2 readings excluded, redundancy" in result.history
+    assert f"exclude='{file}'" in result.command
+    assert "missing" not in [notice.code for notice in result.warnings]
     rows = json.loads((tmp_path / "result" / "result.json").read_text())["excluded"]
     assert [(row["configuration"], row["reason"], row["part"]) for row in rows] == [
         (TRAINING[0], "beam, broken", "training"),
@@ -77,35 +77,35 @@ def test_excluded_readings_count_as_missing_and_the_split_stays(csv: Path, tmp_p
 
 def test_who_excludes_from_the_held_out_part_is_told_what_it_is_worth_with_them(csv: Path, tmp_path: Path) -> None:
     file = _file(tmp_path, (HELD_OUT[0], "2", "looks wrong"))
-    found = calibrate("irb120", csv, model="offsets", exclude=file)
-    (told,) = [one for one in found.warnings if one.code == "held-out-excluded"]
-    assert told.level == "warning"
-    assert "1 reading of the held-out part is excluded: looks wrong (1)." in told.message
+    result = calibrate("irb120", csv, model="offsets", exclude=file)
+    (notice,) = [warning for warning in result.warnings if warning.code == "held-out-excluded"]
+    assert notice.level == "warning"
+    assert "1 reading of the held-out part is excluded: looks wrong (1)." in notice.message
     whole = calibrate("irb120", csv, model="offsets")
-    with_it = known(errors_of(found.fit.robot, whole.data.of_configurations(whole.held_out)).position)
-    without = known(known(found.validation).position)
-    assert f"With it the held-out errors are {with_it.mean * 1e3:.3f} mm on average" in told.message
-    assert f"{with_it.max * 1e3:.3f} mm at most; without it {without.mean * 1e3:.3f}" in told.message
+    with_it = known(errors_of(result.fit.robot, whole.data.of_configurations(whole.held_out)).position)
+    without = known(known(result.validation).position)
+    assert f"With it the held-out errors are {with_it.mean * 1e3:.3f} mm on average" in notice.message
+    assert f"{with_it.max * 1e3:.3f} mm at most; without it {without.mean * 1e3:.3f}" in notice.message
     only_training = _file(tmp_path, (TRAINING[0], "2", "beam broken"))
     fit = calibrate("irb120", csv, model="offsets", exclude=only_training)
-    assert "held-out-excluded" not in [one.code for one in fit.warnings]
+    assert "held-out-excluded" not in [warning.code for warning in fit.warnings]
     # what stands in a configuration that is left out belongs to no part
     file = _file(tmp_path, ("3", "2", "beam broken"))
-    found = calibrate("irb120", csv, model="offsets", exclude=file, without=["3"])
-    assert "Excluded: 1 reading (1 of configurations that are left out): beam broken (1)" in found.lines()
+    result = calibrate("irb120", csv, model="offsets", exclude=file, without=["3"])
+    assert "Excluded: 1 reading (1 of configurations that are left out): beam broken (1)" in result.lines()
 
 
 def test_what_is_excluded_is_no_longer_found_and_counted(truearm: Truearm, csv: Path, tmp_path: Path) -> None:
     before = check("irb120", csv)
-    assert "outliers" in [one.code for one in before.warnings]
+    assert "outliers" in [notice.code for notice in before.warnings]
     file = _file(tmp_path, (HELD_OUT[0], "2", "touched"))
-    done = truearm("check", "irb120", csv, "--exclude", file, "--json")
-    found = {one["code"]: one for one in json.loads(done.out)["warnings"]}
-    assert "outliers" not in found
-    assert found["excluded"]["level"] == "note"
-    assert "1 reading is excluded: touched (1). Excluded readings count as missing." in found["excluded"]["message"]
-    assert "missing" not in found  # whoever has excluded it knows that it is
-    assert "falsifies the proof" in found["excluded"]["message"]
+    outcome = truearm("check", "irb120", csv, "--exclude", file, "--json")
+    by_code = {notice["code"]: notice for notice in json.loads(outcome.out)["warnings"]}
+    assert "outliers" not in by_code
+    assert by_code["excluded"]["level"] == "note"
+    assert "1 reading is excluded: touched (1). Excluded readings count as missing." in by_code["excluded"]["message"]
+    assert "missing" not in by_code  # whoever has excluded it knows that it is
+    assert "falsifies the proof" in by_code["excluded"]["message"]
     words = ["calibrate", "irb120", csv, "--model", "offsets", "--exclude", file, "--json"]
     assert json.loads(truearm(*words, "--out", tmp_path / "r").out)["excluded"][0]["part"] == "held out"
 
@@ -114,9 +114,9 @@ def test_one_of_several_visits_and_reference_points_are_excluded(tmp_path: Path)
     twice = Dataset.of(np.zeros((2, 6)), np.ones((2, 1, 3)), configurations=["a", "b"])
     double = replace(twice.of_readings([0, 0, 1]), visit=np.array([1, 2, 1]), references=twice.of_readings([0, 1]))
     named = replace(double, references=replace(known(double.references), targets=("nest",)))
-    made, counts = without_readings(named, [Exclusion("a", "1", "x", visit="2"), Exclusion("b", "nest", "y")])
-    assert np.isnan(made.position[:, 0]).tolist() == [False, True, False]
-    assert np.isnan(known(made.references).position[:, 0]).tolist() == [False, True]
+    result, counts = without_readings(named, [Exclusion("a", "1", "x", visit="2"), Exclusion("b", "nest", "y")])
+    assert np.isnan(result.position[:, 0]).tolist() == [False, True, False]
+    assert np.isnan(known(result.references).position[:, 0]).tolist() == [False, True]
     assert counts == (1, 1)
     assert without_readings(named, [Exclusion("a", "1", "x")])[1] == (2,)
     text = exclusions_text([Exclusion("a", "1", "x", visit="2"), Exclusion("b", "nest", "y")])
@@ -134,7 +134,7 @@ def test_a_reading_that_is_not_the_one_that_was_excluded_is_refused(csv: Path, t
     path = tmp_path / "excluded.csv"
     head = "configuration,target,reason,read [mm]\n"
     path.write_text(f"{head}5,1,beam broken,{x:.4f} {y:.4f} {z:.4f}\n")
-    assert "excluded" in [one.code for one in check("irb120", csv, exclude=path).warnings]
+    assert "excluded" in [notice.code for notice in check("irb120", csv, exclude=path).warnings]
     longer = DATA.of_configurations([*range(23), 23, 22])  # more measurements of the same names are no others
     assert without_readings(longer, read_exclusions(path))[1] == (1,)
     metres = f"{head.replace('mm', 'm')}5,1,beam broken,{x / 1e3:.7f} {y / 1e3:.7f} {z / 1e3:.7f}\n6,1,by hand,\n"
@@ -172,7 +172,7 @@ def test_what_was_read_is_compared_whatever_was_measured() -> None:
 
 def test_files_that_exclude_nothing_that_was_read_are_refused(csv: Path, tmp_path: Path) -> None:
     path = tmp_path / "excluded.csv"
-    for text, what in (
+    for text, fault in (
         ("configuration,target,reason,read\n1,1,x,1 2 3\n", "line 1, read: no unit is given"),
         ("configuration,target,reason,read [deg]\n1,1,x,1 2 3\n", "line 1, read: this unit does not fit here"),
         ("configuration,target,reason,read [mm]\n1,1,x,1 2 three\n", "line 2, column read .mm.: numbers with blanks"),
@@ -188,4 +188,4 @@ def test_files_that_exclude_nothing_that_was_read_are_refused(csv: Path, tmp_pat
         ("configuration,target,reason,visit\n1,1,x,2\n", "line 2: nothing was read there"),
     ):
         path.write_text(text)
-        refused("exclude", rf"excluded\.csv, {what}", check, "irb120", csv, exclude=path)
+        refused("exclude", rf"excluded\.csv, {fault}", check, "irb120", csv, exclude=path)

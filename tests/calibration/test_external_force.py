@@ -48,30 +48,30 @@ def by_force() -> Robot:
     return calibrated("elastic", 10.0)
 
 
-def said(robot: Robot, wrench: Wrench = SIDEWAYS) -> dict[str, Notice]:
+def notices_of(robot: Robot, wrench: Wrench = SIDEWAYS) -> dict[str, Notice]:
     q = np.random.default_rng(2).uniform(LOW, HIGH, (40, 6))
     return {notice.code: notice for notice in check_force([(robot.with_wrench(wrench, "1"), q)])}
 
 
 def test_a_sideways_force_leans_on_what_gravity_did_not_load(by_gravity: Robot) -> None:
-    told = said(by_gravity)
-    assert told["compliance-unseen"].level == "warning"
-    assert "compliance_1" in told["compliance-unseen"].message
-    assert "It loads axis_1 with " in told["compliance-unseen"].message
-    assert told["force-taken"].level == "note"
-    rigid = said(calibrated("offsets", 0.0))
+    notices = notices_of(by_gravity)
+    assert notices["compliance-unseen"].level == "warning"
+    assert "compliance_1" in notices["compliance-unseen"].message
+    assert "It loads axis_1 with " in notices["compliance-unseen"].message
+    assert notices["force-taken"].level == "note"
+    rigid = notices_of(calibrated("offsets", 0.0))
     assert rigid["force-on-rigid-model"].level == "warning"
     assert "force-taken" not in rigid
 
 
 def test_what_was_pushed_in_calibration_is_known(by_force: Robot) -> None:
-    told = said(by_force, Wrench((0.0, 5.0, 0.0)))
-    assert list(told) == ["force-taken"]
-    assert "moves its tip by up to 0." in told["force-taken"].message
-    assert "known to 0.0" in told["force-taken"].message
-    told = said(replace(by_force, proof=None), Wrench((0.0, 5.0, 0.0)))  # it bends as its values say
-    assert list(told) == ["force-taken"]
-    assert "known to" not in told["force-taken"].message
+    notices = notices_of(by_force, Wrench((0.0, 5.0, 0.0)))
+    assert list(notices) == ["force-taken"]
+    assert "moves its tip by up to 0." in notices["force-taken"].message
+    assert "known to 0.0" in notices["force-taken"].message
+    notices = notices_of(replace(by_force, proof=None), Wrench((0.0, 5.0, 0.0)))  # it bends as its values say
+    assert list(notices) == ["force-taken"]
+    assert "known to" not in notices["force-taken"].message
     assert check_force([]) == check_force([(by_force, np.zeros((3, 6)))]) == []
     assert check_force([(by_force.with_wrench(SIDEWAYS), np.full((2, 6), np.nan))]) == []
 
@@ -83,7 +83,7 @@ def test_the_force_that_is_told_is_as_uncertain_as_the_twin_is_off(by_force: Rob
     pushed = replace(twin, robot=twin.robot.with_wrench(SIDEWAYS, "1"))
     bends = pushed.frames(q)["1"][:, :3, 3] - twin.frames(q)["1"][:, :3, 3]
     predicted = by_force.with_wrench(SIDEWAYS, "1").world_poses(q, "1")[0] - by_force.world_poses(q, "1")[0]
-    words = said(by_force)["force-taken"].message.split("known to ")[1]
+    words = notices_of(by_force)["force-taken"].message.split("known to ")[1]
     deviation = float(words.split(" mm")[0]) * 1e-3
     off = np.linalg.norm(bends - predicted, axis=1)
     assert 0.1 * deviation < off.max() < 3.0 * deviation
@@ -91,26 +91,26 @@ def test_the_force_that_is_told_is_as_uncertain_as_the_twin_is_off(by_force: Rob
 
 
 def test_loads_beyond_those_of_the_calibration_are_told(by_gravity: Robot) -> None:
-    told = said(by_gravity, Wrench((0.0, 0.0, 0.0), (0.0, 3.0, 0.0), "tool"))
-    message = told["loads-beyond-data"].message
-    assert told["loads-beyond-data"].level == "warning"
+    notices = notices_of(by_gravity, Wrench((0.0, 0.0, 0.0), (0.0, 3.0, 0.0), "tool"))
+    message = notices["loads-beyond-data"].message
+    assert notices["loads-beyond-data"].level == "warning"
     assert "axis_4 with " in message or "axis_5 with " in message
     assert "(measured with -0." in message
 
 
 def test_the_rated_load_counts_payload_and_force(by_force: Robot) -> None:
-    told = said(by_force.with_payload("2kg,0mm,0mm,60mm"))
-    assert told["rated-load-exceeded"].level == "warning"
-    assert "make up to 33.6 N, and irb120 is rated for 29.4 N (3 kg)" in told["rated-load-exceeded"].message
-    unknown = said(replace(by_force, rated_load=None))
+    notices = notices_of(by_force.with_payload("2kg,0mm,0mm,60mm"))
+    assert notices["rated-load-exceeded"].level == "warning"
+    assert "make up to 33.6 N, and irb120 is rated for 29.4 N (3 kg)" in notices["rated-load-exceeded"].message
+    unknown = notices_of(replace(by_force, rated_load=None))
     assert unknown["rating-unknown"].level == "note"
 
 
 def test_another_base_of_the_controller_is_told(by_force: Robot) -> None:
     base = Transform((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
     turned = replace(by_force, controller=replace(by_force.controller, base=base))
-    told = said(turned)["force-in-model-base"]
-    assert told.level == "warning"
-    assert "`wrench_frame=controller`" in told.message
-    assert "force-in-model-base" not in said(turned, Wrench((0.0, -14.0, 0.0), frame="controller"))
-    assert "force-in-model-base" not in said(by_force)
+    notice = notices_of(turned)["force-in-model-base"]
+    assert notice.level == "warning"
+    assert "`wrench_frame=controller`" in notice.message
+    assert "force-in-model-base" not in notices_of(turned, Wrench((0.0, -14.0, 0.0), frame="controller"))
+    assert "force-in-model-base" not in notices_of(by_force)

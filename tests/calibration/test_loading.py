@@ -67,8 +67,8 @@ def elastic(truearm: Truearm, folder: Path, data: Path) -> Path:
 
 
 def result(out: Path) -> dict[str, Any]:
-    made: dict[str, Any] = json.loads((out / "result.json").read_text())
-    return made
+    content: dict[str, Any] = json.loads((out / "result.json").read_text())
+    return content
 
 
 EFFECTS = {
@@ -84,11 +84,11 @@ def test_every_model_with_joint_effects(truearm: Truearm, data: Path, tmp_path: 
         words = ["--model", model, "--redundancy", redundancy, "--payload", PAYLOAD, "--out", tmp_path, "--json"]
         run = truearm("calibrate", "irb120", data, *words)
         assert run.code == 0, (redundancy, run.err)
-        summary, found = json.loads(run.out), result(tmp_path)
-        assert found["model"] == {"name": model, "effects": EFFECTS[model]}
-        assert "selection" not in found
+        summary, outcome = json.loads(run.out), result(tmp_path)
+        assert outcome["model"] == {"name": model, "effects": EFFECTS[model]}
+        assert "selection" not in outcome
         assert json.loads(truearm("show", tmp_path / "calibrated.yaml", "--json").out)["effects"] == EFFECTS[model]
-        compliance = next(row for row in found["parameters"] if row["name"] == "compliance_3")
+        compliance = next(row for row in outcome["parameters"] if row["name"] == "compliance_3")
         assert compliance["unit"] == "mrad/(N m)"
         if model == "elastic":
             assert compliance["value"] == pytest.approx(0.130, abs=0.01), redundancy
@@ -106,23 +106,23 @@ def test_every_model_with_joint_effects(truearm: Truearm, data: Path, tmp_path: 
 def test_auto_tells_how_it_chose(truearm: Truearm, data: Path, tmp_path: Path) -> None:
     run = truearm("calibrate", "irb120", data, "--model", "auto", "--payload", PAYLOAD, "--out", tmp_path)
     assert run.code == 0, run.err
-    found = result(tmp_path)
-    chosen, way = found["model"], found["selection"]
+    outcome = result(tmp_path)
+    chosen, way = outcome["model"], outcome["selection"]
     assert chosen["name"] == "auto"
     added = [name for name in chosen["effects"] if name != "compliance"]
     assert f"Chosen model: elastic, and what cross-validation added: {', '.join(added) or 'nothing'}\n" in run.out
     figures, rows = ("geometric_mm", "elastic_mm", "error_mm"), ("candidates", "confirmations", "lines", "passed_over")
     assert list(way) == [*figures, "layout", "blocks", *rows]
     assert list(way["candidates"][0]) == ["effect", "taken", "gain_mm", "standard_error_mm", "reason"]
-    assert {one["effect"] for one in way["candidates"] if one["taken"]} == set(chosen["effects"])
-    assert all(bool(one["reason"]) is not one["taken"] for one in way["candidates"])
+    assert {candidate["effect"] for candidate in way["candidates"] if candidate["taken"]} == set(chosen["effects"])
+    assert all(bool(candidate["reason"]) is not candidate["taken"] for candidate in way["candidates"])
     assert (way["layout"], way["blocks"]) == ("scattered", 0)
     assert 0.01 < way["error_mm"] <= way["elastic_mm"] < 0.1 < way["geometric_mm"]
-    assert found["command"].endswith(f"data.csv --model auto --payload {PAYLOAD} --out DIR")
+    assert outcome["command"].endswith(f"data.csv --model auto --payload {PAYLOAD} --out DIR")
     report = (tmp_path / "report.html").read_text()
-    for one in way["candidates"]:
-        gain = "–" if one["gain_mm"] is None else f"{one['gain_mm']:+.4f}"
-        assert f'<td>{one["effect"]}</td><td class="n">{gain}</td>' in report
+    for tried in way["candidates"]:
+        gain = "–" if tried["gain_mm"] is None else f"{tried['gain_mm']:+.4f}"
+        assert f'<td>{tried["effect"]}</td><td class="n">{gain}</td>' in report
     payload = "Payload</dt><dd>2.7 kg at (50, 25, 100) mm"
     for words in ("How the model was chosen", 'id="candidates"', payload):
         assert words in report
@@ -133,9 +133,9 @@ def test_a_robot_predicts_another_payload_and_another_mounting(truearm: Truearm,
     own = result(elastic.parent)["validation"]["position_mm"]["mean"]
     light = simulated(truearm, folder / "light.csv", "--payload", LIGHT, "--seed", 5, poses=60)
     assert judged(truearm, elastic, light, code=3) > 10 * own  # with the 2.7 kg that the file says
-    found = judged(truearm, elastic, light, "--payload", LIGHT)
-    assert found == pytest.approx(own, rel=0.2)
-    assert judged(truearm, elastic, light, "--payload", "300g,0.05m,25 mm,100mm") == found
+    outcome = judged(truearm, elastic, light, "--payload", LIGHT)
+    assert outcome == pytest.approx(own, rel=0.2)
+    assert judged(truearm, elastic, light, "--payload", "300g,0.05m,25 mm,100mm") == outcome
     hanging = simulated(truearm, folder / "hanging.csv", "--gravity", "0,0,9.81", "--seed", 6)
     assert judged(truearm, elastic, hanging, code=3) > 10 * own
     assert judged(truearm, elastic, hanging, "--gravity", "0,0,9.81") == pytest.approx(own, rel=0.25)
@@ -227,7 +227,7 @@ def test_what_a_model_needs_of_the_data_is_said(truearm: Truearm, data: Path, tm
     header, *rows = (line.split(",", 1) for line in data.read_text().splitlines())
     named, out = tmp_path / "named.csv", ("--out", tmp_path / "out")
     for labels in ("P{}", "{}.5", "-{}"):
-        named.write_text("\n".join([",".join(header), *(f"{labels.format(n)},{rest}" for n, rest in rows)]) + "\n")
+        named.write_text("\n".join([",".join(header), *(f"{labels.format(n)},{cells}" for n, cells in rows)]) + "\n")
         message = refused(truearm, "calibrate", "irb120", named, "--model", "full", *out)
         assert "the effect approach needs the order in which the configurations were measured" in message
         assert "got 'configurations that are not numbered'. Number the configurations 1, 2, 3" in message
@@ -256,9 +256,9 @@ def test_an_effect_can_be_added_to_any_model(truearm: Truearm, data: Path, tmp_p
     arguments = ("calibrate", "irb120", data, "--payload", PAYLOAD, "--out", tmp_path / "out", "--model")
     run = truearm(*arguments, "elastic", "--effect", "bearing-compliance", "--effect", "compliance")
     assert run.code == 0
-    found = result(tmp_path / "out")
-    assert found["model"]["effects"] == ["compliance", "bearing-compliance"]
-    assert "--effect bearing-compliance" in found["command"]
+    outcome = result(tmp_path / "out")
+    assert outcome["model"]["effects"] == ["compliance", "bearing-compliance"]
+    assert "--effect bearing-compliance" in outcome["command"]
     misspelt = refused(truearm, *arguments, "elastic", "--effect", "bearing-complience")
     assert "Did you mean bearing-compliance" in misspelt
     assert "chooses its effects itself" in refused(truearm, *arguments, "auto", "--effect", "fourier")
@@ -314,9 +314,9 @@ def test_spring_brings_the_held_out_error_to_a_fifth(tmp_path_factory: pytest.Te
     before, after = (known(known(each.validation).position) for each in (without, with_it))
     assert after.mean < before.mean / 10.0
     assert after.max < before.max / 10.0
-    found = with_it.robot.parameters["balancer_1"]
-    deviation = known(found.deviation)
-    assert found.value == pytest.approx(STRENGTH, abs=4.0 * deviation)
+    factor = with_it.robot.parameters["balancer_1"]
+    deviation = known(factor.deviation)
+    assert factor.value == pytest.approx(STRENGTH, abs=4.0 * deviation)
     assert deviation < 0.01
     assert "residuals-exceed-sigma" not in codes(with_it)
     assert "balancer-held" not in codes(with_it)
@@ -325,14 +325,14 @@ def test_spring_brings_the_held_out_error_to_a_fifth(tmp_path_factory: pytest.Te
 
 def test_strength_is_held_where_all_readings_carry_one_load(tmp_path_factory: pytest.TempPathFactory) -> None:
     arm, data = campaign(tmp_path_factory.mktemp("arm"), two_loads=False)
-    found = truearm.calibrate(arm, data, model="elastic", effects=["balancer"])
-    assert "balancer_1" not in found.robot.values
-    assert "force_x [N]" in codes(found)["balancer-held"]
-    assert next(n.level for n in found.warnings if n.code == "balancer-held") == "note"
-    assert "+ balancer" not in found.robot.history[-1]
+    outcome = truearm.calibrate(arm, data, model="elastic", effects=["balancer"])
+    assert "balancer_1" not in outcome.robot.values
+    assert "force_x [N]" in codes(outcome)["balancer-held"]
+    assert next(n.level for n in outcome.warnings if n.code == "balancer-held") == "note"
+    assert "+ balancer" not in outcome.robot.history[-1]
     known = arm.with_effects(["balancer"]).with_values({"balancer_1": STRENGTH})
-    kept = truearm.calibrate(known, data, model="elastic", effects=["balancer"])
-    assert kept.robot.values["balancer_1"] == STRENGTH
+    fixed = truearm.calibrate(known, data, model="elastic", effects=["balancer"])
+    assert fixed.robot.values["balancer_1"] == STRENGTH
 
 
 def test_balancer_of_a_robot_that_has_none_is_refused() -> None:

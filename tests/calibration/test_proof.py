@@ -73,8 +73,8 @@ def test_the_rounded_covariance_predicts_as_the_fit_does(calibration: Calibratio
     robot, fit = calibration.robot, calibration.fit
     joints = robot.random_configurations(50, np.random.default_rng(0))
     J = robot.position_jacobian(robot.forward_kinematics(joints, "1"), joints, fit.free.names)
-    exact, kept = (np.einsum("pxn,pq,qxn->n", J, C, J) for C in (fit.covariance, proof_of(robot).covariance))
-    np.testing.assert_allclose(kept, exact, rtol=1e-3)
+    exact, rounded = (np.einsum("pxn,pq,qxn->n", J, C, J) for C in (fit.covariance, proof_of(robot).covariance))
+    np.testing.assert_allclose(rounded, exact, rtol=1e-3)
     # and one without full rank is kept
     parameters = [Parameter.plain(name, "m", "geometry", 0.0, 1e-3) for name in "abc"]
     root = np.array([[1e-3], [-2e-4], [0.0]])
@@ -143,9 +143,9 @@ def test_only_base_and_targets_found_anew(calibration: Calibration) -> None:
     proof = proof_of(again.robot)
     assert (again.status.value, proof.status) == ("converged", "rank-loss")
     assert is_intact(again.robot)
-    was, now = (dict(zip(p.names, p.deviations, strict=True)) for p in (proof_of(before), proof))
-    assert now["a_3"] == pytest.approx(was["a_3"], rel=1e-6)
-    assert now["base_x"] != was["base_x"]
+    was, after = (dict(zip(p.names, p.deviations, strict=True)) for p in (proof_of(before), proof))
+    assert after["a_3"] == pytest.approx(was["a_3"], rel=1e-6)
+    assert after["base_x"] != was["base_x"]
     assert proof.region[0][0] <= proof_of(before).region[0][0]
     edited = proof_of(calibrate(before.with_values({"a_3": 0.2703}), again.data, model="frames").robot)
     assert (edited.status, "a_3" in edited.names) == ("rank-loss", False)
@@ -212,9 +212,9 @@ def test_a_seal_holds_whichever_way_the_factor_is_written(
 def test_a_damaged_text_of_correlations_is_refused() -> None:
     text = correlations_text(many(61))
     assert isinstance(text, str)
-    for damaged, told in (
+    for damaged, fault in (
         (text[:-4], "no text of correlations of so many parameters; got '5907 bytes'; allowed: 5910"),
         (f"{text[:-4]}???!", "got 'other signs than those of base64'"),
         ("/" * 8 + text[8:], "correlations are -1 to 1"),
     ):
-        refused(None, re.escape(told), factor_from, damaged, 61, "robot.yaml, proof.correlations", "")
+        refused(None, re.escape(fault), factor_from, damaged, 61, "robot.yaml, proof.correlations", "")

@@ -25,7 +25,7 @@ from truearm.engine.choosing.search import Gain
 from truearm.engine.choosing.selection import Candidate, Selection
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.curves import FoundCurve
+from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.document.drawing import DARK, deserved, logarithmic_axis, significant, student_975
 from truearm.engine.document.page import json_for_script
@@ -67,7 +67,7 @@ def readings(names: tuple[str, ...], poses: bool, noise: float) -> Dataset:
 
 
 @cache
-def made(
+def calibration_of(
     names: tuple[str, ...] = ("1", "2", "3"),
     *,
     poses: bool = False,
@@ -85,16 +85,16 @@ def made(
         position = data.position.copy()
         position[reading] += [0.02, -0.01, 0.03]
         data = replace(data, position=position)
-    how = partial(identify, model=named_model(model), loss=loss, redundancy=redundancy)
-    return calibration(load_robot("irb120"), data, order[:train], order[train:], how)
+    fit_with = partial(identify, model=named_model(model), loss=loss, redundancy=redundancy)
+    return calibration(load_robot("irb120"), data, order[:train], order[train:], fit_with)
 
 
 def calibration(
-    robot: Robot, data: Dataset, training: IntArray, held_out: IntArray, how: Callable[[Robot, Dataset], Fit]
+    robot: Robot, data: Dataset, training: IntArray, held_out: IntArray, fit_with: Callable[[Robot, Dataset], Fit]
 ) -> Calibration:
     """Return a calibration without all that takes long and is not looked at here."""
     first = data.of_configurations(training)
-    fit = how(robot, first)
+    fit = fit_with(robot, first)
     judged = data.of_configurations(held_out) if len(held_out) else first
     return Calibration(
         fit=fit,
@@ -167,7 +167,7 @@ def cells(html: str) -> list[tuple[float, str]]:
 
 @pytest.mark.parametrize("options", [{}, {"train": 40}, {"poses": True, "model": "offsets"}, {"redundancy": "drop"}])
 def test_elements_nest_and_nothing_is_fetched(options: dict[str, Any]) -> None:
-    shown = page(made(**options))
+    shown = page(calibration_of(**options))
     for tag, attributes in shown.elements:
         assert tag not in ("link", "img", "iframe", "object", "embed")
         assert not {"src", "href", "action", "data", "srcset"} & set(attributes)
@@ -177,20 +177,20 @@ def test_elements_nest_and_nothing_is_fetched(options: dict[str, Any]) -> None:
     assert sum("plotly.js v" in script for script in shown.scripts) == 1
     assert "showSendToCloud: false" in shown.scripts[-1]
     assert {a["id"] for t, a in shown.elements if t == "div" and a.get("class") == "figure"} == set(shown.figures)
-    assert report_html(made(**options)) == report_html(made(**options))
+    assert report_html(calibration_of(**options)) == report_html(calibration_of(**options))
 
 
 def test_which_figures_there_are() -> None:
     limits = {"limits-of-accuracy", "limits-over-the-workspace", "expected-error"}
     own = {"position-histogram", "orientation-histogram", "workspace", "residuals", "correlations"}
-    assert set(page(made(poses=True)).figures) == own | limits
-    exact = page(made(noise=0.0, train=40)).figures
+    assert set(page(calibration_of(poses=True)).figures) == own | limits
+    exact = page(calibration_of(noise=0.0, train=40)).figures
     assert sum(exact["position-histogram"]["data"][1]["y"]) == 120
 
 
 def text_of(**changed: Any) -> str:
     """Return the text of a report with other parts."""
-    return Page(report_html(replace(made(), **changed))).text
+    return Page(report_html(replace(calibration_of(), **changed))).text
 
 
 def test_plotly_itself_is_not_imported() -> None:
@@ -199,7 +199,7 @@ def test_plotly_itself_is_not_imported() -> None:
 
 
 def test_names_are_text() -> None:
-    report = made(("a", HOSTILE), poses=True, model="offsets")
+    report = calibration_of(("a", HOSTILE), poses=True, model="offsets")
     html = report_html(report)
     shown = page(report)
     assert HOSTILE not in html
@@ -227,7 +227,7 @@ def test_json_cannot_leave_its_script() -> None:
 
 
 def test_errors_are_those_of_the_statistics() -> None:
-    report = made(poses=True)
+    report = calibration_of(poses=True)
     shown = cells(report_html(report))[:24]
     expected = []
     for kind in ("position", "orientation"):
@@ -240,7 +240,7 @@ def test_errors_are_those_of_the_statistics() -> None:
 
 
 def test_the_first_figure_is_the_held_out_error() -> None:
-    report = made()
+    report = calibration_of()
     after = known(known(report.validation).position)
     text = page(report).text
     old, new = Report(report).position[:2]
@@ -254,7 +254,7 @@ def test_the_first_figure_is_the_held_out_error() -> None:
     assert "orientation" not in text.split("Warnings")[0]
     for words in (report.fit.status.advice, report.command, report.history, f"NumPy {np.__version__}"):
         assert words in text
-    nothing = page(made(train=40)).text
+    nothing = page(calibration_of(train=40)).text
     for words in (
         "Nothing was held out.",
         "Mean position error on the 40 training configurations",
@@ -263,25 +263,25 @@ def test_the_first_figure_is_the_held_out_error() -> None:
     ):
         assert (words in nothing, words in text) == (True, False)
     assert not [words for words in ("has not seen", "Held-out") if words in nothing]
-    turned = page(made(poses=True)).text
+    turned = page(calibration_of(poses=True)).text
     assert "Mean orientation error on the 12 configurations" in turned
     assert "Orientation error of single readings [mrad]" in turned
     assert re.search(r"orientation 0\.\d+ mrad rotation axis declared in the data", turned)
 
 
 def test_the_error_to_expect_is_on_the_first_page_with_what_it_is_of() -> None:
-    found, text = made().expected, page(made()).text
-    low, high = found.overall.interval_90
-    assert f"{deserved(found.overall.mean * 1e3, (high - low) * 1e3 / 3.29)} mm" in text
+    result, text = calibration_of().expected, page(calibration_of()).text
+    low, high = result.overall.interval_90
+    assert f"{deserved(result.overall.mean * 1e3, (high - low) * 1e3 / 3.29)} mm" in text
     assert "Mean position error to expect over the whole workspace" in text
     assert "Targets 1, 2, 3 in the instrument's frame, no payload" in text
-    bound = replace(made(), expected=replace(found, omissions=("values at a bound count as exact",)))
-    said = Page(report_html(bound)).text
-    assert "The errors may be larger: values at a bound count as exact." in said
+    bound = replace(calibration_of(), expected=replace(result, omissions=("values at a bound count as exact",)))
+    message = Page(report_html(bound)).text
+    assert "The errors may be larger: values at a bound count as exact." in message
     assert ("may be larger" in text, "positions are expected below" in text) == (False, True)
-    assert "positions are expected below" not in said  # nor anywhere else an upper end
+    assert "positions are expected below" not in message  # nor anywhere else an upper end
     table = report_html(bound).partition('id="expected-targets"')[2].partition("</table>")[0]
-    assert table.count("or more") == 1 + len(found.targets)
+    assert table.count("or more") == 1 + len(result.targets)
 
 
 def test_noise_and_notices_in_sentences() -> None:
@@ -290,17 +290,17 @@ def test_noise_and_notices_in_sentences() -> None:
         (True, 2.345, "2.35 times as large as the declared deviations allow"),
         (False, 1.0, "estimated from the training residuals"),
     ):
-        text = text_of(fit=replace(made().fit, declared=declared, excess=excess))
+        text = text_of(fit=replace(calibration_of().fit, declared=declared, excess=excess))
         assert words in text
         assert f"position 0.0500 mm coordinate {'declared' if declared else 'estimated'}" in text
     assert "Errors, warnings and notes None." in text_of(warnings=())
     notice = Notice("odd", "Leave `train` out, or use `loss=cauchy` & <b>.")
-    html = report_html(replace(made(), warnings=(notice,)))
+    html = report_html(replace(calibration_of(), warnings=(notice,)))
     assert "Leave <code>train</code> out, or use <code>loss=cauchy</code> &amp; &lt;b&gt;." in html
 
 
 def test_held_out_readings_without_position() -> None:
-    report = made(poses=True, model="offsets")
+    report = calibration_of(poses=True, model="offsets")
     hidden = np.isin(report.data.configuration, report.held_out)
     data = replace(report.data, position=np.where(hidden[:, None], np.nan, report.data.position))
     judged = data.of_configurations(report.held_out)
@@ -313,7 +313,7 @@ def test_held_out_readings_without_position() -> None:
 
 
 def test_parameters_in_their_units() -> None:
-    report = made()
+    report = calibration_of()
     text = page(report).text
     for name, unit, scale in (("a_3", "mm", 1e3), ("theta_offset_2", "deg", 180 / np.pi)):
         p, start = report.fit.robot.parameters[name], report.fit.start.parameters[name]
@@ -328,27 +328,27 @@ def test_parameters_in_their_units() -> None:
     html = report_html(replace(report, fit=fit))
     assert re.search(r'<tr class="at-bound"><td><code>a_3</code>.*<td>at bound</td></tr>', html)
     assert re.search(r'<tr class="not-determined"><td><code>d_4</code>.*<td>not determined</td></tr>', html)
-    fixed = re.search(r'<tr class="fixed">(.*?)</tr>', report_html(made(poses=True, model="offsets")))
+    fixed = re.search(r'<tr class="fixed">(.*?)</tr>', report_html(calibration_of(poses=True, model="offsets")))
     assert known(fixed)[1].endswith("<td>fixed</td>")
     assert "bar" not in known(fixed)[1]
 
 
 def test_drop_names_every_combination() -> None:
-    report = made(redundancy="drop")
+    report = calibration_of(redundancy="drop")
     text = page(report).text
     assert report.fit.redundancies
     for redundancy in report.fit.redundancies:
         assert f"{redundancy.dropped} held: {redundancy.combination}" in text
     assert text.count("held: redundant") == len(report.fit.redundancies)
     assert f"{len(report.fit.redundancies)} held because they are redundant" in text
-    assert "Redundant combinations" not in page(made()).text
+    assert "Redundant combinations" not in page(calibration_of()).text
 
 
 # -- the pictures ------------------------------------------------------------------------------------------
 
 
 def test_histograms_count_every_reading_in_the_same_bins() -> None:
-    report = made(poses=True)
+    report = calibration_of(poses=True)
     for name in ("position-histogram", "orientation-histogram"):
         before, after = page(report).figures[name]["data"]
         assert before["x"] == after["x"]
@@ -357,7 +357,7 @@ def test_histograms_count_every_reading_in_the_same_bins() -> None:
 
 
 def test_workspace_is_in_the_base_frame_in_mm() -> None:
-    report = made()
+    report = calibration_of()
     cloud = page(report).figures["workspace"]["data"][0]
     part = Report(report).judged_part
     shown = np.array([cloud["x"], cloud["y"], cloud["z"]]).T
@@ -379,7 +379,7 @@ def test_workspace_is_in_the_base_frame_in_mm() -> None:
 
 
 def test_residuals_are_means_over_targets_in_measuring_order() -> None:
-    report = made()
+    report = calibration_of()
     training, held_out = page(report).figures["residuals"]["data"]
     assert training["x"] == sorted((report.training + 1).tolist())
     assert held_out["x"] == sorted((report.held_out + 1).tolist())
@@ -392,7 +392,7 @@ def test_residuals_are_means_over_targets_in_measuring_order() -> None:
 def test_readings_with_little_weight_are_marked() -> None:
     losses: tuple[Loss, ...] = ("huber", "cauchy", "l1")
     for loss in losses:
-        report = made(loss=loss, outlier=True)
+        report = calibration_of(loss=loss, outlier=True)
         marks = page(report).figures["residuals"]["data"][2]
         worst = int(np.argmax(marks["y"]))
         assert marks["x"][worst] == report.training[4] + 1, loss
@@ -402,7 +402,7 @@ def test_readings_with_little_weight_are_marked() -> None:
 
 
 def test_correlations_of_the_arms_own_parameters() -> None:
-    report = made()
+    report = calibration_of()
     drawn = page(report).figures["correlations"]["data"][0]
     free = report.fit.free
     own = [i for i, p in enumerate(free.parameters) if p.group not in ("base", "target", "fixture")]
@@ -425,8 +425,8 @@ def test_correlations_of_the_arms_own_parameters() -> None:
 
 
 def test_a_dark_screen_has_colours_for_every_picture() -> None:
-    html = report_html(made(poses=True, outlier=True))
-    shown = page(made(poses=True, outlier=True))
+    html = report_html(calibration_of(poses=True, outlier=True))
+    shown = page(calibration_of(poses=True, outlier=True))
     used = set(re.findall(r'"(#[0-9a-f]{6})"', json.dumps(shown.figures)))
     assert used <= set(DARK)
     assert "prefers-color-scheme: dark" in html
@@ -434,7 +434,7 @@ def test_a_dark_screen_has_colours_for_every_picture() -> None:
 
 
 def test_the_first_page_is_a_certificate() -> None:
-    noted = replace(made(), notes={"serial": "4711", "operator": "A & B", "room": "20 degC"})
+    noted = replace(calibration_of(), notes={"serial": "4711", "operator": "A & B", "room": "20 degC"})
     html = report_html(replace(noted, warnings=(Notice("odd", "Odd."), Notice("bad", "Bad.", "error"))))
     first = html[html.index('<div class="certificate">') : html.index('<section id="warnings">')]
     for words in ("Serial number</dt><dd>4711", "A &amp; B", "Room</dt><dd>20 degC", "converged", "Signature", "Bad."):
@@ -478,8 +478,8 @@ def test_numbers_have_the_digits_that_they_deserve() -> None:
 
 
 def test_the_shares_of_the_square_are_drawn_and_listed() -> None:
-    shown = page(made())
-    assert made().budget is not None
+    shown = page(calibration_of())
+    assert calibration_of().budget is not None
     (bars,) = shown.figures["limits-of-accuracy"]["data"]
     shares = ["instrument noise", "what the model cannot express", "uncertain parameters", "remainder"]
     assert bars["y"] == [*shares, "held out, together"]
@@ -492,12 +492,12 @@ def test_the_shares_of_the_square_are_drawn_and_listed() -> None:
 # -- joint curves ------------------------------------------------------------------------------------------
 
 
-def curve(places: Array, deviation: float = 1.0) -> FoundCurve:
+def curve(places: Array, deviation: float = 1.0) -> FittedCurve:
     """Return a curve of 10 mdeg, 7 periods in a turn, of a joint from -120 to 150 deg; deviation of terms in mdeg."""
     amounts = np.zeros(120)
     amounts[12] = math.radians(0.010)
     shown = math.radians(-120), math.radians(150)
-    return FoundCurve(3, "J3", amounts, np.eye(120) * math.radians(deviation * 1e-3) ** 2, shown, np.radians(places))
+    return FittedCurve(3, "J3", amounts, np.eye(120) * math.radians(deviation * 1e-3) ** 2, shown, np.radians(places))
 
 
 @cache
@@ -505,8 +505,8 @@ def curved() -> Calibration:
     nominal, rng = load_robot("li3"), np.random.default_rng(2)
     twin = truth_twin(nominal, "gear-errors", np.random.default_rng(1))
     data = measure(twin, nominal.random_configurations(80, rng), 1e-5, rng)
-    how = partial(identify, model=named_model("geometric").also(["joint-curve"]))
-    return calibration(nominal, data, np.arange(60), np.arange(60, 80), how)
+    fit_with = partial(identify, model=named_model("geometric").also(["joint-curve"]))
+    return calibration(nominal, data, np.arange(60), np.arange(60, 80), fit_with)
 
 
 def test_a_picture_has_the_curve_its_band_and_where_was_measured() -> None:
@@ -534,10 +534,10 @@ def test_a_picture_has_the_curve_its_band_and_where_was_measured() -> None:
 
 
 def test_a_wide_band_outside_the_measured_range_does_not_flatten_the_curve() -> None:
-    found = curve(np.linspace(-60, 150, 60))
+    result = curve(np.linspace(-60, 150, 60))
     amounts = np.zeros((120, 120))
     amounts[0, 0] = math.radians(1.0) ** 2  # the sine of one period: a degree, which no picture of 10 mdeg can hold
-    wide = FoundCurve(found.number, found.name, found.amounts, amounts, found.shown, np.radians([-5.0, 0.0, 5.0]))
+    wide = FittedCurve(result.number, result.name, result.amounts, amounts, result.shown, np.radians([-5.0, 0.0, 5.0]))
     bottom, top = curve_figure(wide)["layout"]["yaxis"]["range"]
     assert 100 < top - bottom < 2000  # the band has 170 mdeg to either side at 5 deg, 2000 at 90 deg
     (row,) = curves_table([curve(np.linspace(-60, 150, 60), deviation=0.1)]).rows
@@ -546,7 +546,7 @@ def test_a_wide_band_outside_the_measured_range_does_not_flatten_the_curve() -> 
 
 def test_the_report_shows_each_curve_and_not_its_hundreds_of_numbers() -> None:
     run = curved()
-    names = [f"joint-curve-{one.number}" for one in run.curves]
+    names = [f"joint-curve-{fitted_curve.number}" for fitted_curve in run.curves]
     assert names
     drawn = Report(run).figures()
     assert [name for name in drawn if name.startswith("joint-curve")] == names
@@ -558,7 +558,7 @@ def test_the_report_shows_each_curve_and_not_its_hundreds_of_numbers() -> None:
     assert "curve_sin1_" not in tables
     assert not [name for name in drawn["correlations"]["data"][0]["x"] if name.startswith("curve_")]
     result = json.loads(json.dumps(run.result()))
-    assert [one["joint"] for one in result["curves"]] == [one.number for one in run.curves]
+    assert [entry["joint"] for entry in result["curves"]] == [fitted_curve.number for fitted_curve in run.curves]
     assert not [row for row in result["parameters"] if row["name"].startswith("curve_")]
     assert [line for line in run.lines() if line.startswith("Joint 1: curve of ")]
     assert len(run.plot(f"joint-curve-{run.curves[0].number}").data) == 4

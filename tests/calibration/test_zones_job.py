@@ -64,22 +64,22 @@ def test_what_is_kept_is_written_and_read(cut: tuple[Path, Calibration]) -> None
     folder, run = cut
     zones = known(run.zones)
     names = {path.name for path in (folder / "out").iterdir()}
-    kept = [verdict.box.name for verdict in zones.kept]
+    zone_names = [verdict.box.name for verdict in zones.kept]
     assert names == {*run.written, "truearm.manifest.json"}
-    assert {f"zone-{name}.yaml" for name in kept} < names
-    found = json.loads((folder / "out" / "result.json").read_text())["zones"]
-    assert found["kept"] == kept
-    assert [zone["kept"] for zone in found["zones"]].count(True) == len(kept)
+    assert {f"zone-{name}.yaml" for name in zone_names} < names
+    result = json.loads((folder / "out" / "result.json").read_text())["zones"]
+    assert result["kept"] == zone_names
+    assert [zone["kept"] for zone in result["zones"]].count(True) == len(zone_names)
     content = read_zones(folder / "out" / "zones.yaml")
     boxes, overlap = boxes_of(content, "zones.yaml")
     assert overlap == pytest.approx(0.05)
     for box, verdict in zip(boxes, zones.kept, strict=True):
         assert box.low == pytest.approx(verdict.box.low, abs=1e-6)
         assert box.high == pytest.approx(verdict.box.high, abs=1e-6)
-    robot = load_robot(folder / "out" / f"zone-{kept[0]}.yaml")
+    robot = load_robot(folder / "out" / f"zone-{zone_names[0]}.yaml")
     assert is_intact(robot)
     assert len(known(robot.proof).measured) == zones.kept[0].training
-    assert robot.history[-1].endswith(f"zone {kept[0]}")
+    assert robot.history[-1].endswith(f"zone {zone_names[0]}")
     page = (folder / "out" / "report.html").read_text()
     assert 'id="zone-errors"' in page
     assert any(line.startswith("Zones: ") for line in run.lines())
@@ -114,7 +114,7 @@ def test_zones_of_a_file(bending: tuple[Twin, Dataset], tmp_path: Path) -> None:
 
 def test_a_file_of_zones_that_cannot_be_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "zones.yaml"
-    for text, told in (
+    for text, fault in (
         ("zones: {}\n", "too few entries"),
         ("zones: {a: {}}\n", "a zone without limits is the whole workspace"),
         ("zones: {a: {x: [null, null]}}\n", "a zone without limits is the whole workspace"),
@@ -130,24 +130,24 @@ def test_a_file_of_zones_that_cannot_be_is_refused(tmp_path: Path) -> None:
         ("zones: {a: {x: [0, 9], robot: {file: ../b.yaml, proof: no}}}\n", "robot"),
     ):
         file.write_text(HEAD + text)
-        refused(None, told, lambda: boxes_of(read_zones(file), str(file)))
+        refused(None, fault, lambda: boxes_of(read_zones(file), str(file)))
     file.write_text("truearm: truearm-zones/1\nzones: {a: {x: [0, 9]}}\n")
     refused(None, "units", read_zones, file)
 
 
 def test_what_cannot_be_cut_is_refused(bending: tuple[Twin, Dataset]) -> None:
     _, data = bending
-    for zones, told in (
+    for zones, fault in (
         (1, "out of range; got 1; allowed: 2 to 64"),
         ("nowhere.yaml", "there is no such file"),
         (2.5, "a whole number belongs here"),
     ):
-        refused(None, told, calibrate, "irb120", data, zones=zones)
+        refused(None, fault, calibrate, "irb120", data, zones=zones)
     words = r"zones are judged on held-out configurations.*Leave `train` out"
     refused(None, words, calibrate, "irb120", data, zones=2, train="all")
-    held = measured_with(named_device("point"), load_robot("irb120"), bending[0], 30, np.random.default_rng(0))
+    measured = measured_with(named_device("point"), load_robot("irb120"), bending[0], 30, np.random.default_rng(0))
     words = "zones need readings that say where the robot stands"
-    refused(None, words, calibrate, "irb120", held, zones=2, model="offsets")
+    refused(None, words, calibrate, "irb120", measured, zones=2, model="offsets")
 
 
 def test_zones_are_for_validate_alone(cut: tuple[Path, Calibration], tmp_path: Path) -> None:
@@ -159,24 +159,24 @@ def test_zones_are_for_validate_alone(cut: tuple[Path, Calibration], tmp_path: P
     refused(None, r"moved is found with one robot.*Give calibrated.yaml", validate, zones, data, refit="base")
     file.write_text(HEAD + "zones: {left: {y: [0, null]}}\n")
     refused(None, "says where zones are, and not which robot is in each", validate, file, data)
-    kept = [f"zone-{verdict.box.name}.yaml" for verdict in known(run.zones).kept]
-    for name in ("zones.yaml", "calibrated.yaml", *kept):
+    files = [f"zone-{verdict.box.name}.yaml" for verdict in known(run.zones).kept]
+    for name in ("zones.yaml", "calibrated.yaml", *files):
         (tmp_path / name).write_bytes((folder / "out" / name).read_bytes())
-    (tmp_path / kept[0]).write_bytes((folder / "out" / "calibrated.yaml").read_bytes())
+    (tmp_path / files[0]).write_bytes((folder / "out" / "calibrated.yaml").read_bytes())
     refused(None, "this robot is of another calibration than the zones", validate, file, data)
-    (tmp_path / kept[0]).unlink()
+    (tmp_path / files[0]).unlink()
     refused(None, "there is no such file", validate, file, data)
 
 
 def test_the_command_takes_a_number_or_a_file(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(csv_text(campaign("irb120", 60, 0.02e-3, 7)[1]))
     words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--out", str(tmp_path / "out"), "--details"]
-    told = CliRunner().invoke(program(), [*words, "--zones", "2"])
-    assert told.exit_code == 0
-    assert "\nZones: " in told.stdout
-    assert told.stdout.splitlines()[-1].startswith(f"Written to {tmp_path / 'out'}: calibrated.yaml, result.json")
-    told = CliRunner().invoke(program(), [*words, "--zones", "2 or 3"])
-    assert told.exit_code != 0
+    outcome = CliRunner().invoke(program(), [*words, "--zones", "2"])
+    assert outcome.exit_code == 0
+    assert "\nZones: " in outcome.stdout
+    assert outcome.stdout.splitlines()[-1].startswith(f"Written to {tmp_path / 'out'}: calibrated.yaml, result.json")
+    outcome = CliRunner().invoke(program(), [*words, "--zones", "2 or 3"])
+    assert outcome.exit_code != 0
 
 
 def test_boxes_fill_the_space_and_are_nearly_cubes() -> None:
@@ -186,9 +186,9 @@ def test_boxes_fill_the_space_and_are_nearly_cubes() -> None:
     assert divisions_for(places, 8) == (4, 1, 2)
     assert divisions_for(places, 5) == (5, 1, 1)
     boxes = cut_boxes(places, (2, 1, 2))
-    held = np.array([box.holds(places) for box in boxes])
-    assert (held.sum(axis=0) == 1).all()
-    assert held.sum(axis=1).min() > 60
+    inside = np.array([box.holds(places) for box in boxes])
+    assert (inside.sum(axis=0) == 1).all()
+    assert inside.sum(axis=1).min() > 60
 
 
 def test_the_nominal_flange_is_that_of_the_table(cut: tuple[Path, Calibration]) -> None:

@@ -132,8 +132,8 @@ def unit_length(data: Dataset, rng: np.random.Generator) -> Dataset:
 
 def unit_angle(data: Dataset, rng: np.random.Generator) -> Dataset:
     joints = data.joints.copy()
-    which = slice(None) if rng.random() < 0.5 else int(rng.integers(joints.shape[1] - 2))
-    joints[:, which] *= rng.choice([np.pi / 180, 180 / np.pi])
+    chosen = slice(None) if rng.random() < 0.5 else int(rng.integers(joints.shape[1] - 2))
+    joints[:, chosen] *= rng.choice([np.pi / 180, 180 / np.pi])
     return replace(data, joints=joints)
 
 
@@ -148,8 +148,8 @@ def joint_sign(data: Dataset, rng: np.random.Generator) -> Dataset:
 
 
 def duplicates(data: Dataset, rng: np.random.Generator) -> Dataset:
-    mine = np.flatnonzero(data.configuration == rng.integers(data.configurations))
-    return data.of_readings([*range(len(data.target)), *mine.tolist()])
+    repeated = np.flatnonzero(data.configuration == rng.integers(data.configurations))
+    return data.of_readings([*range(len(data.target)), *repeated.tolist()])
 
 
 def beyond_limits(data: Dataset, rng: np.random.Generator) -> Dataset:
@@ -197,8 +197,8 @@ def test_a_reading_that_is_off_is_no_exchange_of_targets(side: tuple[float, floa
         at = rng.integers(3, size=6)
         position[wrong, at] += 1e-3 * outward[at]
         data = Dataset.of(rng.uniform(-1.0, 1.0, (20, 6)), position)
-        found = {(s.rule.code, s.configuration, s.target) for s in rigid_suspects(data)}
-        assert found == {("outliers", str(c + 1), str(t + 1)) for c, t in zip(wrong, at, strict=True)}, seed
+        suspects = {(s.rule.code, s.configuration, s.target) for s in rigid_suspects(data)}
+        assert suspects == {("outliers", str(c + 1), str(t + 1)) for c, t in zip(wrong, at, strict=True)}, seed
 
 
 def test_of_many_targets_the_wrong_one_is_named() -> None:
@@ -268,14 +268,14 @@ def test_a_known_motion_of_the_table_is_removed() -> None:
 def test_joints_read_before_settling_show(measured_data: Path) -> None:
     folder = measured_data / "irb120-faro"
     targets = {str(i): folder / f"target_{i}.txt" for i in (1, 2, 3)}
-    found = {}
+    results = {}
     for name in ("commanded", "read"):
         data, _ = read_matrices(folder / f"joints_{name}.txt", targets, {}, "deg", "mm")
         run = calibrate("irb120", data, train=300)
         mean = known(run.validation).position_norms.mean() * 1e3
-        found[name] = (mean, {n.code: n.message for n in run.warnings})
-    assert "joints-not-settled" not in found["commanded"][1]
-    mean, notices = found["read"]
+        results[name] = (mean, {n.code: n.message for n in run.warnings})
+    assert "joints-not-settled" not in results["commanded"][1]
+    mean, notices = results["read"]
     assert mean <= 0.50
     assert "before the robot had settled" in notices["joints-not-settled"]
     assert "hysteresis" in notices["joints-not-settled"]
@@ -306,30 +306,30 @@ def test_configurations_that_are_off_are_not_called_nothing_wrong() -> None:
     _, data = campaign("irb120", 30, 0.05e-3, 17)
     joints = data.joints.copy()
     joints[7, 1] += np.radians(0.05)
-    found = check("irb120", replace(data, joints=joints))
-    assert not found.warnings
-    assert found.next[0].code == "measure-again"
-    assert found.lines()[2] == "Nothing looks wrong but the configurations named next."
+    result = check("irb120", replace(data, joints=joints))
+    assert not result.warnings
+    assert result.next[0].code == "measure-again"
+    assert result.lines()[2] == "Nothing looks wrong but the configurations named next."
     assert check("irb120", data).lines()[2] == "Nothing looks wrong."
 
 
 def test_messages_count_in_words() -> None:
     _, data = campaign("irb120", 10, 0.05e-3, 17)
 
-    def told(broken: Dataset, robot: str | None = None) -> list[str]:
+    def messages_of(broken: Dataset, robot: str | None = None) -> list[str]:
         return [notice.message for notice in check(robot, broken).warnings]
 
     lost = moved_readings(data, np.array([4]), np.array(np.nan))
-    assert told(lost) == ["1 reading is missing (1 of target 2). It is left out; nothing needs to be done."]
-    (far,) = told(moved_readings(data, np.array([4]), np.array([5e-3, 5e-3, 8e-3])))
+    assert messages_of(lost) == ["1 reading is missing (1 of target 2). It is left out; nothing needs to be done."]
+    (far,) = messages_of(moved_readings(data, np.array([4]), np.array([5e-3, 5e-3, 8e-3])))
     assert far.startswith("1 reading is far from where it must be (configuration/target): 2/2 (")
     assert far.endswith("Measure it again or leave it out; `loss=cauchy` lets it count little.")
-    (wrong,) = told(moved_readings(data, np.array([4]), np.array([0.3, 0.0, 0.0])))
+    (wrong,) = messages_of(moved_readings(data, np.array([4]), np.array([0.3, 0.0, 0.0])))
     assert wrong.startswith("1 reading is far from where it must be (configuration/target): 2/2 (")
     elsewhere = data.position[5] - data.position[4]
-    (wrong,) = told(moved_readings(data, np.array([4]), elsewhere))
+    (wrong,) = messages_of(moved_readings(data, np.array([4]), elsewhere))
     assert wrong.startswith("1 reading was taken from another point than it names (configuration/target): 2/")
-    (repeated,) = told(data.of_readings([*range(30), 4]))
+    (repeated,) = messages_of(data.of_readings([*range(30), 4]))
     assert repeated.startswith("1 reading repeats another one to the last digit (target at configurations): 2 at 2 and")
     single = replace(data, joints=data.joints[:, :1], joint_kinds=("revolute",), approach=None)
     refused(None, "got '1 joint column'; allowed: 6", check, "irb120", single)
@@ -338,9 +338,9 @@ def test_messages_count_in_words() -> None:
 def test_the_old_order_of_robot_and_data_is_refused_with_the_new_line(
     truearm: Truearm, small: Path, tmp_path: Path
 ) -> None:
-    done = truearm("check", small / "data.csv", "irb120")
-    assert done.code == 2
-    assert f"Write 'truearm check irb120 {small / 'data.csv'}'." in done.err
+    run = truearm("check", small / "data.csv", "irb120")
+    assert run.code == 2
+    assert f"Write 'truearm check irb120 {small / 'data.csv'}'." in run.err
     assert truearm("check", "irb120", small / "data.csv").code == 0
     refused(None, r"this is a robot.*Exchange robot and measurements", calibrate, "irb120", "irb120")
     (tmp_path / "arm.yaml").write_text("# an arm\ntruearm: truearm-robot/1\n")

@@ -92,13 +92,13 @@ def test_what_cannot_be_the_robot_is_implausible_and_its_cause_named(
     assert not run.finished
     first = run.warnings[0]
     assert first.level == "error"
-    (told,) = [n for n in run.warnings if n.code == "implausible"]
-    assert told.level == "error"
+    (implausible,) = [n for n in run.warnings if n.code == "implausible"]
+    assert implausible.level == "error"
     assert "enter wider priors" not in " ".join(n.message for n in run.warnings)
     if code is not None:
         assert first.code == code
         assert words in first.message
-        assert f"The cause is most likely what {code} says" in told.message
+        assert f"The cause is most likely what {code} says" in implausible.message
 
 
 def of_some(factor: float, share: float) -> Callable[[Dataset], Dataset]:
@@ -119,7 +119,7 @@ def in_metres_with_a_sign(data: Dataset) -> Dataset:
 
 
 def test_units_of_positions_are_named_by_what_fits() -> None:
-    for spoil, told in (
+    for spoil, expected in (
         (of_some(1e3, 0.4), ["are a thousand times too large, as if mm were called m; those of the others are not"]),
         (of_some(1e-3, 0.4), ["are a thousand times too small, as if m were called mm; those of the others are not"]),
         (of_some(25.4, 0.1), ["are 25.4 times too large, as if mm were called inches; those"]),
@@ -128,7 +128,7 @@ def test_units_of_positions_are_named_by_what_fits() -> None:
     ):
         errors = [notice for notice in check(ROBOT, spoil(honest())).warnings if notice.level == "error"]
         assert errors[0].code == "unit-length"
-        for notice, words in zip(errors, told, strict=True):
+        for notice, words in zip(errors, expected, strict=True):
             assert words in notice.message
 
 
@@ -143,7 +143,7 @@ def rows_of(data: Dataset, first: int, last: int, factor: float, target: int | N
 
 @pytest.mark.parametrize("of_one", [False, True])
 def test_rows_in_another_unit_of_length_are_all_named_and_nothing_else_is_said_of_them(of_one: bool) -> None:
-    for first, last, factor, said in (
+    for first, last, factor, words in (
         (5, 5, 1e-3, "at configuration 5 are a thousand times too small"),
         (5, 10, 1e-3, "at configurations 5 to 10 are a thousand times too small"),
         (1, 19, 1e-3, "at configurations 1 to 19 are a thousand times too small"),
@@ -153,9 +153,9 @@ def test_rows_in_another_unit_of_length_are_all_named_and_nothing_else_is_said_o
         data, rows = rows_of(one_target_of(honest()) if of_one else honest(), first, last, factor)
         run = check(ROBOT, data)
         (notice,) = run.warnings
-        assert (notice.code, notice.level, said in notice.message) == ("unit-length", "error", True), notice.message
-        assert {"/".join(where) for where in notice.at} == rows, said
-        assert [step.code for step in run.next] == ["fix-data"], said
+        assert (notice.code, notice.level, words in notice.message) == ("unit-length", "error", True), notice.message
+        assert {"/".join(place) for place in notice.at} == rows, words
+        assert [step.code for step in run.next] == ["fix-data"], words
 
 
 def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
@@ -163,7 +163,7 @@ def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
     (notice,) = check(None, data).warnings
     assert (notice.code, notice.level) == ("unit-length", "error")
     assert "lie 1000 times closer together at configurations 5 to 10 than at the others" in notice.message
-    assert {"/".join(where) for where in notice.at} == rows
+    assert {"/".join(place) for place in notice.at} == rows
     (notice,) = check(None, rows_of(honest(), 1, 19, 1 / 25.4)[0]).warnings
     assert "lie 25.4 times farther apart at configurations 20 to 24 than at the others" in notice.message
     # two rows of a long campaign are named, and a reading alone
@@ -174,7 +174,7 @@ def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
     data, more = rows_of(data, 60, 60, 1 / 25.4, target=1)
     (notice,) = check(ROBOT, data).warnings
     assert "; the positions at 60/2 (configuration/target) are 25.4 times too small" in notice.message
-    assert {"/".join(where) for where in notice.at} == rows | more
+    assert {"/".join(place) for place in notice.at} == rows | more
 
 
 def test_honest_data_have_no_error() -> None:
@@ -240,8 +240,8 @@ def test_joint_positions_that_belong_to_no_row_are_told_and_not_their_readings()
 def test_a_robot_is_not_another_one_because_of_one_wrong_row() -> None:
     joints = honest().joints.copy()
     joints[3, 2] += 0.2
-    found = {n.code for n in calibrate(ROBOT, replace(honest(), joints=joints)).warnings}
-    assert ("joints-mistaken" in found, "wrong-robot" in found) == (True, False)
+    found_codes = {n.code for n in calibrate(ROBOT, replace(honest(), joints=joints)).warnings}
+    assert ("joints-mistaken" in found_codes, "wrong-robot" in found_codes) == (True, False)
 
 
 def one_target_of(data: Dataset) -> Dataset:
@@ -267,9 +267,9 @@ def test_blocks_of_rows_and_all_rows_in_another_unit_of_angle_are_told(
     for share in (0.3, 0.5, 0.8):
         joints, some = data.joints.copy(), round(share * data.configurations)
         joints[:some] = units(joints[:some])
-        (told,) = [n for n in check(ROBOT, replace(data, joints=joints)).warnings if n.level == "error"]
-        assert told.code == "unit-angle", share
-        assert f"{words}, at some configurations alone (1, 2" in told.message, share
+        (error,) = [n for n in check(ROBOT, replace(data, joints=joints)).warnings if n.level == "error"]
+        assert error.code == "unit-angle", share
+        assert f"{words}, at some configurations alone (1, 2" in error.message, share
     every = check(ROBOT, replace(data, joints=units(data.joints))).warnings
     assert any(n.message == f"The joints: {words}. Fix the unit in the header." for n in every)
 
@@ -303,11 +303,11 @@ def test_a_misspelt_target_is_told() -> None:
     data = replace(honest(), targets=("A", "B", "C"))
     assert not check(None, data).warnings
     first_of = np.flatnonzero(data.target == 0).tolist()
-    found = {n.code: n for n in check(None, renamed(data, first_of[3:5], "a")).warnings}
-    assert found["target-misspelt"].level == "error"
-    assert "a at 4, 5, where A is missing: did you mean A?" in found["target-misspelt"].message
-    found = {n.code: n for n in check(None, renamed(data, first_of[6:7], "B")).warnings}
-    assert "B is there twice at 7, and A not at all" in found["target-misspelt"].message
+    by_code = {n.code: n for n in check(None, renamed(data, first_of[3:5], "a")).warnings}
+    assert by_code["target-misspelt"].level == "error"
+    assert "a at 4, 5, where A is missing: did you mean A?" in by_code["target-misspelt"].message
+    by_code = {n.code: n for n in check(None, renamed(data, first_of[6:7], "B")).warnings}
+    assert "B is there twice at 7, and A not at all" in by_code["target-misspelt"].message
     other = renamed(data, first_of[3:5], "spare-marker")
     assert "target-misspelt" not in {n.code for n in check(None, other).warnings}
 
@@ -316,8 +316,8 @@ def test_positions_that_a_controller_computed_are_told() -> None:
     robot = load_robot(ROBOT)
     joints = honest().joints
     positions = np.round(robot.forward(joints)[0], 5)
-    found = {n.code: n for n in check(ROBOT, Dataset.of(joints, positions)).warnings}
-    assert found["positions-computed"].level == "warning"
-    assert "computes such positions from its joints" in found["positions-computed"].message
+    by_code = {n.code: n for n in check(ROBOT, Dataset.of(joints, positions)).warnings}
+    assert by_code["positions-computed"].level == "warning"
+    assert "computes such positions from its joints" in by_code["positions-computed"].message
     few = Dataset.of(joints[:9], positions[:9])
     assert "positions-computed" not in {n.code for n in check(ROBOT, few).warnings}

@@ -78,8 +78,8 @@ def test_a_misspelled_fixture_is_refused_with_its_likeness() -> None:
 def test_rows_in_another_order_are_not_called_a_joint_in_another_unit() -> None:
     """A joint that would hardly move lets any sphere fit a little better."""
     data = campaign("ballbar")[1]
-    found = codes(replace(data, joints=data.joints[::-1].copy()))
-    assert ("unit-angle" in found, "fixtures-unlikely" in found) == (False, True)
+    messages = codes(replace(data, joints=data.joints[::-1].copy()))
+    assert ("unit-angle" in messages, "fixtures-unlikely" in messages) == (False, True)
 
 
 def test_right_signs_fit_and_a_wrong_one_does_not() -> None:
@@ -97,9 +97,9 @@ def test_anchors_that_stand_elsewhere_are_named() -> None:
     setup = known(data.setup)
     moved = setup.position.copy()
     moved[3, 0] += 5e-3
-    found = codes(replace(data, setup=replace(setup, position=moved)))
-    assert list(found) == ["fixture-misplaced"]
-    assert "string_4 by 5.0" in found["fixture-misplaced"]
+    messages = codes(replace(data, setup=replace(setup, position=moved)))
+    assert list(messages) == ["fixture-misplaced"]
+    assert "string_4 by 5.0" in messages["fixture-misplaced"]
     swapped = replace(setup, position=setup.position[[0, 1, 3, 2]])
     assert list(codes(replace(data, setup=swapped))) == ["fixtures-unlikely"]
 
@@ -155,8 +155,8 @@ def test_readings_beyond_the_range_of_a_device_are_named() -> None:
         else:
             moved = np.where(np.arange(len(data.target))[:, None] == 4, 4.0, 0.0)
             far = replace(data, position=data.position + moved)
-        (told,) = (notice.message for notice in check(far, device=device).warnings if notice.code == "beyond-range")
-        assert f"1 reading is beyond what the device {device} can read (configuration/target): 5/" in told
+        (message,) = (notice.message for notice in check(far, device=device).warnings if notice.code == "beyond-range")
+        assert f"1 reading is beyond what the device {device} can read (configuration/target): 5/" in message
 
 
 def test_stereo_cameras_read_a_sphere_larger_than_the_cube_that_is_used_of_it() -> None:

@@ -34,22 +34,26 @@ def worn(effects: tuple[str, ...] = ()) -> Robot:
     return robot.with_values(values)
 
 
-def corrected_lines(made: truearm.ProgramCorrection) -> list[str]:
+def corrected_lines(result: truearm.ProgramCorrection) -> list[str]:
     """Return the names of the targets that were corrected."""
-    (one,) = made.result.corrections
-    return [t.name for t, done in zip(one.program.targets, one.corrected.tolist(), strict=True) if done]
+    (correction,) = result.result.corrections
+    return [
+        t.name
+        for t, is_corrected in zip(correction.program.targets, correction.corrected.tolist(), strict=True)
+        if is_corrected
+    ]
 
 
 def test_home_stays_unless_it_is_asked_for(tmp_path: Path) -> None:
-    made = compensate(worn(), [plate(tmp_path)])
-    (one,) = made.result.corrections
-    homes = [i for i, target in enumerate(one.program.targets) if target.form.kind == "joints"]
-    assert [one.kept.get(i) for i in homes] == ["given by joints"]
-    again = made.as_written()[0].targets
-    assert again[homes[0]].values == one.program.targets[homes[0]].values
+    result = compensate(worn(), [plate(tmp_path)])
+    (correction,) = result.result.corrections
+    homes = [i for i, target in enumerate(correction.program.targets) if target.form.kind == "joints"]
+    assert [correction.kept.get(i) for i in homes] == ["given by joints"]
+    again = result.as_written()[0].targets
+    assert again[homes[0]].values == correction.program.targets[homes[0]].values
     asked = compensate(worn(), [plate(tmp_path)], joint_targets="correct")
     assert asked.files[0].kept.total() == 0
-    assert asked.as_written()[0].targets[homes[0]].values != one.program.targets[homes[0]].values
+    assert asked.as_written()[0].targets[homes[0]].values != correction.program.targets[homes[0]].values
 
 
 def test_only_some_and_without_some(tmp_path: Path) -> None:
@@ -71,15 +75,15 @@ def test_only_some_and_without_some(tmp_path: Path) -> None:
 
 def test_taught_points_stay_byte_for_byte(tmp_path: Path) -> None:
     program = plate(tmp_path)
-    made = compensate(worn(), [program], taught=["points"])
-    offsets = {t.name for t in made.result.corrections[0].program.targets if t.parent is not None}
-    assert set(corrected_lines(made)) <= offsets
+    result = compensate(worn(), [program], taught=["points"])
+    offsets = {t.name for t in result.result.corrections[0].program.targets if t.parent is not None}
+    assert set(corrected_lines(result)) <= offsets
     # A program of which all was taught was written with a record, and refused as corrected already when given again.
     alone, out = tmp_path / "alone.mod", tmp_path / "out"
     alone.write_text("\n".join(line for line in program.read_text().splitlines() if "Offs" not in line))
-    made = compensate(worn(), [alone], taught=["points"], out=out)
-    assert "Warning (nothing-corrected): Nothing was corrected: the programs are as they were." in made.lines()
-    assert (out / "alone.mod").read_bytes() == made.files[0].text == alone.read_bytes()
+    result = compensate(worn(), [alone], taught=["points"], out=out)
+    assert "Warning (nothing-corrected): Nothing was corrected: the programs are as they were." in result.lines()
+    assert (out / "alone.mod").read_bytes() == result.files[0].text == alone.read_bytes()
     again = compensate(worn(), [out / "alone.mod"])
     assert again.files[0].corrected > 10
     assert "nothing-corrected" not in codes(again)
@@ -91,12 +95,12 @@ def test_an_offset_from_a_point_that_stays_is_as_long_as_it_says(tmp_path: Path)
         moves = "MoveJ p1,v100,fine,tool0;", f"MoveL {offset},v100,fine,tool0;"
         path = module(tmp_path, *moves, data=(f"CONST robtarget p1:={pose(400, 100)};",))
         robot, wanted = worn(), np.linalg.norm([120, 80, 60]) * 1e-3
-        for said in ({"taught": ["points"]}, {"taught": ["none"], "keep": ["p1"]}):
-            made = compensate(robot, [path], **said)  # type: ignore[arg-type]
-            (one,) = made.result.corrections
-            assert one.corrected.tolist() == [False, True], offset
+        for words in ({"taught": ["points"]}, {"taught": ["none"], "keep": ["p1"]}):
+            result = compensate(robot, [path], **words)  # type: ignore[arg-type]
+            (correction,) = result.result.corrections
+            assert correction.corrected.tolist() == [False, True], offset
             lengths = []
-            for program in (one.program, made.as_written()[0]):
+            for program in (correction.program, result.as_written()[0]):
                 tips = matrices(robot, commanded(robot, program))[:, :3, 3]
                 lengths.append(float(np.linalg.norm(tips[1] - tips[0])))
             assert abs(lengths[0] - wanted) > 5e-5, offset
@@ -118,9 +122,9 @@ def test_frames_that_were_taught_each_have_a_shift_of_their_own(tmp_path: Path) 
     )
     path = module(tmp_path, "ConfJ\\Off;", *moves, data=tuple(data))
     for taught, apart in ((["none"], True), (["frames"], False)):
-        (one,) = compensate(worn(), [path], taught=taught).result.corrections
-        assert one.corrected.all()
-        shifts = (one.after - one.before)[:, :3, 3].reshape(2, 9, 3).mean(axis=1)
+        (correction,) = compensate(worn(), [path], taught=taught).result.corrections
+        assert correction.corrected.all()
+        shifts = (correction.after - correction.before)[:, :3, 3].reshape(2, 9, 3).mean(axis=1)
         assert (np.linalg.norm(shifts, axis=1) > 2e-5).all() == apart
         if not apart:
             np.testing.assert_allclose(shifts, 0.0, atol=2e-7)
@@ -143,18 +147,18 @@ def test_what_was_taught_is_asked_and_contradictions_are_refused(tmp_path: Path)
 def test_the_arm_bends_by_what_the_program_says_that_its_tool_weighs(tmp_path: Path) -> None:
     robot = worn(("compliance",)).with_payload(Payload(1.0, (0.0, 0.0, 0.05)))
     program = plate(tmp_path)
-    made = compensate(robot, [program], taught=["none"])
-    assert made.result.loads == {"tProbe": Payload(2.7, (0.05, 0.025, 0.1))}
-    given = compensate(robot, [program], taught=["none"], payload="2.7kg,50mm,25mm,100mm")
-    assert given.files[0].text == made.files[0].text
-    assert given.result.loads == {}
+    result = compensate(robot, [program], taught=["none"])
+    assert result.result.loads == {"tProbe": Payload(2.7, (0.05, 0.025, 0.1))}
+    stated = compensate(robot, [program], taught=["none"], payload="2.7kg,50mm,25mm,100mm")
+    assert stated.files[0].text == result.files[0].text
+    assert stated.result.loads == {}
     other = compensate(robot, [program], taught=["none"], payload="1kg,0mm,0mm,50mm")
-    assert other.files[0].text != made.files[0].text
+    assert other.files[0].text != result.files[0].text
     dummy = plate(tmp_path, ("[2.7,[50,25,100]", "[0.001,[0,0,0.001]"))
     assert compensate(robot, [dummy], taught=["none"]).result.loads == {"tProbe": None}
-    (said,) = [n for n in compensate(robot, [dummy]).warnings if n.code == "loads-taken"]
-    assert "No mass is known of tProbe: there the 1 kg of the calibration are kept." in said.message
-    assert replace(said).level == "note"
+    (notice,) = [n for n in compensate(robot, [dummy]).warnings if n.code == "loads-taken"]
+    assert "No mass is known of tProbe: there the 1 kg of the calibration are kept." in notice.message
+    assert replace(notice).level == "note"
 
 
 def test_a_script_that_says_once_what_the_robot_carries() -> None:
@@ -176,13 +180,13 @@ def test_a_script_that_says_once_what_the_robot_carries() -> None:
 
 def test_a_load_unlike_that_of_the_calibration_is_warned_of(tmp_path: Path) -> None:
     bare, program = worn(("compliance",)), plate(tmp_path)
-    (said,) = [n for n in compensate(bare, [program]).warnings if n.code == "loads-taken"]
-    assert said.level == "warning"
-    assert "In its calibration the robot carried 0 kg." in said.message
+    (notice,) = [n for n in compensate(bare, [program]).warnings if n.code == "loads-taken"]
+    assert notice.level == "warning"
+    assert "In its calibration the robot carried 0 kg." in notice.message
     robot = bare.with_payload(Payload(2.7, (0.05, 0.025, 0.1)))
-    told = codes(compensate(robot, [program]))
-    assert told["loads-taken"] == "note"
-    assert "load-changes" not in told
+    warnings = codes(compensate(robot, [program]))
+    assert warnings["loads-taken"] == "note"
+    assert "load-changes" not in warnings
     for line in ("GripLoad lPart;", "tProbe.tload.mass:=6;", "MoveL pHole1,v10,z1,tProbe\\TLoad:=lPart;"):
         changing = plate(tmp_path, ("PROC main()", f"PROC main()\n    {line}"))
         assert "load-changes" in codes(compensate(robot, [changing], accept=["skipped"])), line
@@ -191,9 +195,9 @@ def test_a_load_unlike_that_of_the_calibration_is_warned_of(tmp_path: Path) -> N
 
 
 def test_a_tool_elsewhere_than_the_program_has_it_is_named(tmp_path: Path) -> None:
-    for x, told in (("9", True), ("1", False)):
+    for x, is_named in (("9", True), ("1", False)):
         tools = cell(tmp_path, f"tools:\n  tProbe: {{of: flange, translation: [{x}, 0, 125]}}\n")
-        assert ("tool-apart" in codes(compensate(worn(), [plate(tmp_path)], tools=tools))) == told
+        assert ("tool-apart" in codes(compensate(worn(), [plate(tmp_path)], tools=tools))) == is_named
 
 
 def test_frames_and_tools_of_targets_that_stay_need_no_place(tmp_path: Path) -> None:
@@ -259,10 +263,10 @@ def test_tool0_and_wobj0_are_the_flange_and_the_base(tmp_path: Path) -> None:
                 f"tools:\n  {tool}: {{of: flange, translation: [0.1, 0, 0]}}\n"
                 f"frames:\n  {frame}: {{of: base, translation: [0, 0.2, 0]}}\n",
             )
-            made = truearm.compensate(worn(), [program], tools=places, frames=places, **ANSWERED)
-            assert made.files[0].corrected == 3
-            assert made.result.frames.tools == made.result.frames.frames == "identified"
-            texts.add(made.files[0].text)
+            result = truearm.compensate(worn(), [program], tools=places, frames=places, **ANSWERED)
+            assert result.files[0].corrected == 3
+            assert result.result.frames.tools == result.result.frames.frames == "identified"
+            texts.add(result.files[0].text)
         assert len(texts) == 1
         assert texts != {program.read_bytes()}
 
@@ -279,7 +283,7 @@ def test_a_single_target_is_corrected_where_its_frame_is_known(tmp_path: Path) -
     assert known.files[0].corrected == 1
     assert known.files[0].largest_shift > 1e-4
     together = truearm.compensate(worn(), [program], **ANSWERED)
-    assert not [made for made in (known, together) if "nothing-corrected" in codes(made)]
+    assert not [result for result in (known, together) if "nothing-corrected" in codes(result)]
 
 
 def test_of_frames_that_were_taught_one_with_a_single_target_leaves_it(tmp_path: Path) -> None:
@@ -302,4 +306,7 @@ def test_a_position_of_fanuc_is_named_with_or_without_its_comment() -> None:
     )
     target = FANUC_LS.read([Source(Path("a.ls"), f"{text}/END\n")])
     for name in ("P[2]", "P[2:seam]", "P[2*"):
-        assert [Patterns([target], [name], "keep").fit(one.name) for one in target.targets] == [False, True], name
+        assert [Patterns([target], [name], "keep").fit(position.name) for position in target.targets] == [
+            False,
+            True,
+        ], name

@@ -50,9 +50,9 @@ def program(folder: Path, text: str) -> Path:
 
 
 def test_a_controller_that_is_surely_calibrated_is_asked_for_its_kinematics(tmp_path: Path) -> None:
-    for said in (None, "unknown"):
+    for stated in (None, "unknown"):
         with pytest.raises(InputError, match="compute with what the factory measured") as refusal:
-            compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=said)
+            compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics=stated)
         assert refusal.value.parameter == "controller_kinematics"
         for words in ("calibration.conf", "`controller_kinematics=nominal`", "proprietary"):
             assert words in str(refusal.value)
@@ -75,10 +75,10 @@ def test_a_model_that_nobody_can_read_is_refused_for_poses(tmp_path: Path) -> No
 def test_joints_do_not_pass_through_kinematics(tmp_path: Path) -> None:
     for kinematics in ("proprietary", "unknown"):
         job = [program(tmp_path, JOINTS)]
-        made = truearm.compensate(worn("ur10", kinematics), job)  # nothing is corrected, so nothing is asked either
-        assert made.files[0].text == job[0].read_bytes(), kinematics
-        told = compensate(worn("ur10", kinematics), job, controller_kinematics=None, joint_targets="correct")
-        assert told.files[0].corrected == 2, kinematics
+        result = truearm.compensate(worn("ur10", kinematics), job)  # nothing is corrected, so nothing is asked either
+        assert result.files[0].text == job[0].read_bytes(), kinematics
+        outcome = compensate(worn("ur10", kinematics), job, controller_kinematics=None, joint_targets="correct")
+        assert outcome.files[0].corrected == 2, kinematics
 
 
 def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path) -> None:
@@ -101,24 +101,24 @@ def test_both_questions_are_asked_at_once_and_nothing_is_written(tmp_path: Path)
         with pytest.raises(InputError) as refusal:
             truearm.compensate(worn("irb120"), job, out=out, **answered)
         assert refusal.value.parameter == left
-    made = compensate(worn("irb120"), job, out=out)
-    assert made.files[0].corrected == 2
-    assert made.files[0].text == compensate(worn("irb120", "nominal"), job).files[0].text
+    result = compensate(worn("irb120"), job, out=out)
+    assert result.files[0].corrected == 2
+    assert result.files[0].text == compensate(worn("irb120", "nominal"), job).files[0].text
 
 
 def test_a_cell_file_keeps_the_answers(tmp_path: Path) -> None:
     job = [program(tmp_path, RAPID)]
-    kept = cell(tmp_path, "taught: [none]\ncontroller_kinematics: nominal\n")
-    told = compensate(worn("irb120"), job)
-    for made in (
-        truearm.compensate(worn("irb120"), job, tools=kept),
-        truearm.compensate(worn("irb120"), job, frames=kept),
+    answers = cell(tmp_path, "taught: [none]\ncontroller_kinematics: nominal\n")
+    result = compensate(worn("irb120"), job)
+    for built in (
+        truearm.compensate(worn("irb120"), job, tools=answers),
+        truearm.compensate(worn("irb120"), job, frames=answers),
     ):
-        assert (made.files[0].text, made.applied()["taught"]) == (told.files[0].text, [])
-        assert made.applied()["controller"] == told.applied()["controller"]
-    assert truearm.compensate(worn("irb120"), job, tools=kept, taught=["points"]).files[0].kept == {"taught": 1}
+        assert (built.files[0].text, built.applied()["taught"]) == (result.files[0].text, [])
+        assert built.applied()["controller"] == result.applied()["controller"]
+    assert truearm.compensate(worn("irb120"), job, tools=answers, taught=["points"]).files[0].kept == {"taught": 1}
     with pytest.raises(InputError, match="two files answer this differently"):
-        truearm.compensate(worn("irb120"), job, tools=kept, frames=cell(tmp_path, "taught: [points]\n", "b.yaml"))
+        truearm.compensate(worn("irb120"), job, tools=answers, frames=cell(tmp_path, "taught: [points]\n", "b.yaml"))
     other = cell(tmp_path, "controller_kinematics: proprietary\n", "b.yaml")
     with pytest.raises(InputError, match="that nobody else can read"):
         compensate(worn("irb120"), job, controller_kinematics=None, frames=other)
@@ -128,9 +128,9 @@ def test_a_cell_file_names_a_kinematics_file_from_its_own_folder(tmp_path: Path)
     """The file is of another UR10 than this one, which is noticed only if it is read."""
     (tmp_path / "cell").mkdir()
     (tmp_path / "cell" / "calibration.conf").write_text(UR10_CONF)
-    for name, said in (("calibration.conf", "not those of this arm"), ("calibration.cnf", "no such file")):
+    for name, words in (("calibration.conf", "not those of this arm"), ("calibration.cnf", "no such file")):
         answers = cell(tmp_path / "cell", f"taught: [none]\ncontroller_kinematics: {name}\n")
-        with pytest.raises(InputError, match=said) as refusal:
+        with pytest.raises(InputError, match=words) as refusal:
             truearm.compensate(worn("ur10"), [program(tmp_path, POSES)], tools=answers)
     assert refusal.value.parameter == "tools, frames"
 
@@ -138,14 +138,14 @@ def test_a_cell_file_names_a_kinematics_file_from_its_own_folder(tmp_path: Path)
 def test_kinematics_of_another_arm_are_refused_until_they_are_accepted(tmp_path: Path) -> None:
     """What a factory measured of an arm is nearer to what calibration finds of it than the data sheet is."""
     robot, job, out = worn("ur10"), [program(tmp_path, POSES)], tmp_path / "out"
-    for text, said in (
+    for text, words in (
         (UR3E_CONF, "the kinematics of another type of robot"),
         (UR10_CONF[:300], "six numbers in brackets belong here"),
         (UR10_CONF, r"not those of this arm: .* the data sheet 1\.00 mm"),
     ):
         conf = tmp_path / "other.conf"
         conf.write_text(text)
-        with pytest.raises(InputError, match=said) as refusal:
+        with pytest.raises(InputError, match=words) as refusal:
             compensate(robot, job, controller_kinematics=conf, out=out)
         assert refusal.value.parameter == "controller_kinematics"
         assert not out.exists()
@@ -160,8 +160,8 @@ def test_kinematics_of_another_arm_are_refused_until_they_are_accepted(tmp_path:
 
 
 def test_a_controller_of_a_maker_who_calibrates_every_arm_is_doubted_to_be_nominal(tmp_path: Path) -> None:
-    made = compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics="nominal")
-    assert "controller-nominal" in {notice.code for notice in made.warnings}
+    result = compensate(worn("ur10"), [program(tmp_path, POSES)], controller_kinematics="nominal")
+    assert "controller-nominal" in {notice.code for notice in result.warnings}
 
 
 def test_an_imported_robot_is_not_a_calibrated_one(tmp_path: Path) -> None:
@@ -186,30 +186,30 @@ def test_saying_what_the_controller_has_does_not_change_what_is_known_of_a_calib
 def test_the_command_names_its_option(truearm: Truearm, tmp_path: Path) -> None:
     (tmp_path / "worn.yaml").write_text(robot_text(worn("ur10")))
     answers = ("--taught", "none", "--out", tmp_path / "out")
-    given = ("compensate", tmp_path / "worn.yaml", program(tmp_path, POSES), *answers)
-    refused = truearm(*given)
+    command = ("compensate", tmp_path / "worn.yaml", program(tmp_path, POSES), *answers)
+    refused = truearm(*command)
     assert refused.code == 2
     assert "--controller-kinematics nominal" in " ".join(refused.err.split())
     (tmp_path / "calibration.conf").write_text(UR10_CONF)
-    other = truearm(*given, "--controller-kinematics", tmp_path / "calibration.conf")
+    other = truearm(*command, "--controller-kinematics", tmp_path / "calibration.conf")
     assert other.code == 2
     assert "--accept other-kinematics" in " ".join(other.err.split())
     accepted = ("--controller-kinematics", tmp_path / "calibration.conf", "--accept", "other-kinematics")
-    assert truearm(*given, *accepted).code == 0
+    assert truearm(*command, *accepted).code == 0
 
 
 def test_the_command_imports(truearm: Truearm, tmp_path: Path) -> None:
     conf, out = tmp_path / "calibration.conf", tmp_path / "mine.yaml"
     conf.write_text(UR10_CONF)
-    done = truearm("import", "ur-kinematics", conf, "--robot", "ur10e", "--out", out)
-    assert done.code == 0
-    assert "Warning (type-doubtful): The file is rather of an arm of type ur10." in " ".join(done.out.split())
+    outcome = truearm("import", "ur-kinematics", conf, "--robot", "ur10e", "--out", out)
+    assert outcome.code == 0
+    assert "Warning (type-doubtful): The file is rather of an arm of type ur10." in " ".join(outcome.out.split())
     again = truearm("import", "ur-kinematics", conf, "--robot", "ur10", "--out", out)
     assert again.code == 2  # nothing is overwritten
     refused = truearm("import", "ur-kinematics", conf, "--robot", "ur5e", "--out", tmp_path / "no.yaml")
     assert refused.code == 2
     assert "Of the library, ur10 and ur10e fit." in " ".join(refused.err.split())
     assert not (tmp_path / "no.yaml").exists()
-    told = truearm("import", "ur-kinematics", conf, "--robot", "ur10", "--out", tmp_path / "b.yaml", "--json")
-    assert '"type-not-told"' in told.out
-    assert '"joint_checksum": "0x6e0f7bf' in told.out
+    listing = truearm("import", "ur-kinematics", conf, "--robot", "ur10", "--out", tmp_path / "b.yaml", "--json")
+    assert '"type-not-told"' in listing.out
+    assert '"joint_checksum": "0x6e0f7bf' in listing.out

@@ -66,12 +66,12 @@ def planned(folder: Path, twin: Twin, speed: float, acceleration: float, step: f
 def true_errors(twin: Twin, path: CorrectedPath) -> dict[Knowledge, Array]:
     """How far the twin is from the path in motion [mm], by what the correction knows."""
     motion = path.motion
-    found: dict[Knowledge, Array] = {}
+    errors: dict[Knowledge, Array] = {}
     for name, joints in path.joints.items():
         went = twin.postures(joints, velocity=motion.velocity, acceleration=motion.acceleration)
         at = np.array([posture.targets["1"][:3, 3] for posture in went])
-        found[name] = 1e3 * np.linalg.norm(at - path.planned.trajectory.position, axis=1)
-    return found
+        errors[name] = 1e3 * np.linalg.norm(at - path.planned.trajectory.position, axis=1)
+    return errors
 
 
 def test_the_twin_keeps_to_a_corrected_path(measured: tuple[Twin, Robot], tmp_path: Path) -> None:
@@ -160,13 +160,13 @@ def test_what_the_robot_cannot_do_is_told_with_the_place(measured: tuple[Twin, R
     plain, unlimited = planned(tmp_path, twin, 100, 500, 0.2), "joint_speeds: [30, 250, 250, 320, 320, 420]\n"
     too_fast = r"section 3, .* mm along the path, at .* s .*faster than the file allows.*axis_1 at"
     far = replace(plain.trajectory, position=plain.trajectory.position * 5.0)
-    for path, said in (
+    for path, words in (
         (planned(tmp_path, twin, 500, 2000, 0.05, unlimited), too_fast),
         (planned(tmp_path, twin, 100, 500, 0.2, "joint_speeds: [30, 250]\n"), "not as many speeds as joints"),
         (replace(plain, trajectory=far), "the motion cannot start"),
         (replace(plain, target="9"), "9"),
     ):
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=words):
             correct_path(robot, path, NEAR)
 
 

@@ -66,8 +66,8 @@ def test_the_call_that_made_it_is_in_the_report(program: Path) -> None:
     assert correction.robot.payload.mass == 1.0
     (split,) = correction.splits
     assert split.added > 0
-    said = f"{split.moves} straight or circular moves were split by {split.added} more targets"
-    assert said in (program.parent / "o" / "compensation.html").read_text()
+    words = f"{split.moves} straight or circular moves were split by {split.added} more targets"
+    assert words in (program.parent / "o" / "compensation.html").read_text()
     assert f"  {split.moves} moves split by {split.added} more targets" in correction.lines()
     assert compensate(calibrated(), [program]).command.startswith(f"truearm.compensate(ROBOT, ['{program}'], ")
 
@@ -85,8 +85,8 @@ def test_what_a_simulated_robot_does_is_said_first(program: Path) -> None:
 def test_originals_are_restored(program: Path) -> None:
     """Of two programs of one name each from its folder."""
     other, out, back = plate(program.parent / "two"), program.parent / "out", program.parent / "back"
-    made = compensate(calibrated(), [program, other], out=out)
-    names = [file.name for file in made.files]
+    result = compensate(calibrated(), [program, other], out=out)
+    names = [file.name for file in result.files]
     assert names == [f"{program.parent.name}/plate.mod", "two/plate.mod"]
     corrected = [out / name for name in names]
     restored = truearm.revert(corrected[:1])
@@ -113,8 +113,8 @@ def test_refusals_name_the_parameter(program: Path) -> None:
         ({"tools": program.parent / "none.yaml"}, "tools", "none.yaml"),
         ({"frames": program.parent / "none.yaml"}, "frames", "none.yaml"),
     )
-    for keywords, parameter, said in cases:
-        with pytest.raises(InputError, match=said) as refusal:
+    for keywords, parameter, words in cases:
+        with pytest.raises(InputError, match=words) as refusal:
             compensate(calibrated(), [program], **keywords)
         assert refusal.value.parameter == parameter
 
@@ -192,8 +192,8 @@ def test_a_ledger_that_cannot_be_written_is_said(program: Path, monkeypatch: pyt
     monkeypatch.undo()
     # A link to a robot leads to its ledger.
     (program.parent / "link.yaml").symlink_to(robot)
-    made = compensate(program.parent / "link.yaml", [program], out=program.parent / "other")
-    assert "ledger-not-written" not in codes(made)
+    result = compensate(program.parent / "link.yaml", [program], out=program.parent / "other")
+    assert "ledger-not-written" not in codes(result)
     assert [path.name for path in sorted(robot.parent.iterdir())] == ["calibrated.yaml", LEDGER]
     assert not (program.parent / LEDGER).exists()
     assert "ledger-not-written" not in codes(compensate(calibrated(), [program]))
@@ -218,8 +218,8 @@ def test_the_program_of_a_path_is_remembered(tmp_path: Path) -> None:
         "truearm: truearm-path/1\nunits: {length: mm, angle: deg, time: s}\nspeed: 100\nacceleration: 500\nstep: 0.1\n"
         "orientation: {quaternion: [0, 0, 1, 0]}\nstart: [350, -50, 300]\nsections:\n  - line: [350, 50, 300]\n"
     )
-    given = {"languages": ["rapid"], "move_to": "poses", "controller_kinematics": "nominal"}
-    truearm.path(robot, file, out=tmp_path / "out", **given)  # type: ignore[arg-type]
+    options = {"languages": ["rapid"], "move_to": "poses", "controller_kinematics": "nominal"}
+    truearm.path(robot, file, out=tmp_path / "out", **options)  # type: ignore[arg-type]
     (written,) = (tmp_path / "out").glob("*.mod")
     with pytest.raises(InputError, match='corrected already; got "the comment'):
         compensate(robot, [written])
@@ -235,6 +235,6 @@ def test_the_program_of_a_path_is_remembered(tmp_path: Path) -> None:
 
 def test_what_stays_by_its_name_is_said_not_to_be_in_the_errors(program: Path) -> None:
     robot = truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, 8)[1]).robot
-    said = "  Targets that stay because of `keep` or `only` are not in these errors."
-    assert said in compensate(robot, [program], keep=["pHole3"]).lines()
-    assert said not in compensate(robot, [program]).lines()
+    words = "  Targets that stay because of `keep` or `only` are not in these errors."
+    assert words in compensate(robot, [program], keep=["pHole3"]).lines()
+    assert words not in compensate(robot, [program]).lines()

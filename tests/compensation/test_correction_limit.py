@@ -62,8 +62,10 @@ def test_it_is_that_of_the_targets_where_there_are_some() -> None:
 def test_position_and_orientation_count_each_for_itself() -> None:
     def checked(moved: float, turned: float, accepted: CorrectionLimit | None) -> list[str]:
         sizes, limit = (np.array([0.0, moved]), np.array([0.0, turned])), CorrectionLimit(1e-3, 1e-3)
-        found = check_size(*sizes, limit, accepted, where=lambda row: f"line {row}", check="Look.", parameter="frames")
-        return [notice.code for notice in found]
+        warnings = check_size(
+            *sizes, limit, accepted, where=lambda row: f"line {row}", check="Look.", parameter="frames"
+        )
+        return [notice.code for notice in warnings]
 
     large, small = (CorrectionLimit.of(text, "accept_correction") for text in ("95mm,3deg", "0.5mm,3deg"))
     assert checked(0.9e-3, 0.9e-3, None) == []
@@ -89,9 +91,9 @@ def test_what_is_accepted_is_a_length_and_an_angle(tmp_path: Path) -> None:
 def test_a_frame_with_a_entry_error_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     """A digit of a frame was wrong, and 100 mm were promised to become 0.06 mm."""
     program, out = plate(tmp_path), tmp_path / "out"
-    given = {"frames": placed(tmp_path, "of: base, translation: [410, -110, 60]"), "out": out, **ANSWERED}
+    options = {"frames": placed(tmp_path, "of: base, translation: [410, -110, 60]"), "out": out, **ANSWERED}
     with pytest.raises(InputError, match=r"All targets share a shift of 99\.\d\d mm") as refusal:
-        truearm.compensate(longer(), [program], **given)
+        truearm.compensate(longer(), [program], **options)
     refused = refusal.value
     assert refused.parameter == "frames"
     assert "got up to 99." in str(refused)
@@ -100,10 +102,10 @@ def test_a_frame_with_a_entry_error_is_refused_before_anything_is_written(tmp_pa
     # The numbers of the refusal are enough, and are no word for every program.
     accepted = str(refused).rpartition("`accept_correction=")[2].partition("`")[0]
     with pytest.raises(InputError, match="larger than what was accepted"):
-        truearm.compensate(longer(), [program], accept_correction="90mm,3deg", **given)
-    made = truearm.compensate(longer(), [program], accept_correction=accepted, accept=["skipped"], **given)
-    assert [notice.level for notice in made.warnings if notice.code == "corrections-large"] == ["warning"]
-    assert f"accept_correction='{accepted}'" in made.command
+        truearm.compensate(longer(), [program], accept_correction="90mm,3deg", **options)
+    result = truearm.compensate(longer(), [program], accept_correction=accepted, accept=["skipped"], **options)
+    assert [notice.level for notice in result.warnings if notice.code == "corrections-large"] == ["warning"]
+    assert f"accept_correction='{accepted}'" in result.command
     assert out.exists()
 
 
@@ -113,9 +115,9 @@ def test_an_honest_frame_is_not_refused_and_a_turned_one_is(tmp_path: Path) -> N
     Two conventions of angles make a turn; about the middle of the targets it hardly moves them.
     """
     frames = placed(tmp_path, "of: base, translation: [310.5, -110, 60], wpr: [0, 0, 0.005]")
-    made = truearm.compensate(longer(), [plate(tmp_path)], frames=frames, **ANSWERED)
-    assert "corrections-large" not in codes(made)
-    assert made.files[0].corrected == 43
+    result = truearm.compensate(longer(), [plate(tmp_path)], frames=frames, **ANSWERED)
+    assert "corrections-large" not in codes(result)
+    assert result.files[0].corrected == 43
     frames = placed(tmp_path, "of: base, translation: [310, -110, 60], wpr: [0, 0, 1]")
     with pytest.raises(InputError, match=r"and 1\.0\d deg; allowed"):
         truearm.compensate(longer(), [plate(tmp_path)], frames=frames, accept_correction="50mm,0.9deg", **ANSWERED)
@@ -129,8 +131,8 @@ def probed() -> Robot:
 def test_the_target_of_another_tool_is_refused(tmp_path: Path) -> None:
     frame = "of: base, translation: [310, -110, 60]"
     tip, nest = (placed(tmp_path / name, frame, f"of: flange, target: {name}") for name in ("tip", "nest"))
-    made = truearm.compensate(probed(), [plate(tmp_path)], frames=tip, tools=tip, **ANSWERED)
-    assert made.files[0].corrected == 43
+    result = truearm.compensate(probed(), [plate(tmp_path)], frames=tip, tools=tip, **ANSWERED)
+    assert result.files[0].corrected == 43
     with pytest.raises(InputError, match="larger than the errors of this robot explain") as refusal:
         truearm.compensate(probed(), [plate(tmp_path)], frames=nest, tools=nest, **ANSWERED)
     assert refusal.value.parameter == "frames, tools"
@@ -155,11 +157,11 @@ def springy() -> Robot:
 
 def test_a_load_makes_no_room_for_itself(tmp_path: Path) -> None:
     frames = placed(tmp_path, "of: base, translation: [310, -110, 60]")
-    given = {"frames": frames, "wrench": "0N,0N,-20N,0Nm,0Nm,0Nm", **ANSWERED}
-    made = truearm.compensate(springy(), [plate(tmp_path)], payload="1.2kg,0mm,0mm,50mm", **given)
-    assert made.files[0].corrected == 43
+    options = {"frames": frames, "wrench": "0N,0N,-20N,0Nm,0Nm,0Nm", **ANSWERED}
+    result = truearm.compensate(springy(), [plate(tmp_path)], payload="1.2kg,0mm,0mm,50mm", **options)
+    assert result.files[0].corrected == 43
     with pytest.raises(InputError, match="larger than the errors of this robot explain") as refusal:
-        truearm.compensate(springy(), [plate(tmp_path)], payload="120kg,0mm,0mm,50mm", **given)
+        truearm.compensate(springy(), [plate(tmp_path)], payload="120kg,0mm,0mm,50mm", **options)
     assert f"allowed: up to {correction_limit(springy()).text}, twice" in str(refusal.value)
 
 
@@ -169,9 +171,9 @@ def test_an_assumed_base_may_turn_targets_farther(tmp_path: Path) -> None:
     forward = "[0.707107,0,0.707107,0],[0,0,0,0]"
     moves = (f"MoveJ {pose(*place, forward)},v100,fine,tool0;" for place in places)
     program = module(tmp_path, "ConfJ\\Off;", *moves)
-    (one,) = truearm.compensate(longer(), [program], **ANSWERED).result.corrections
-    assert one.corrected.all()
-    assert one.turned.max() > 1.4 * correction_limit(longer()).turned
+    (correction,) = truearm.compensate(longer(), [program], **ANSWERED).result.corrections
+    assert correction.corrected.all()
+    assert correction.turned.max() > 1.4 * correction_limit(longer()).turned
 
 
 FANUC: Final = Transform((0.42, -0.15, -0.12), (math.cos(math.radians(5)), 0.0, 0.0, math.sin(math.radians(5))))
@@ -222,12 +224,12 @@ UTOOL: Final = "controller: {translation: [0, 0, 120]}"
 
 def test_a_measured_place_does_not_say_what_the_controller_has(tmp_path: Path) -> None:
     """It did, and programs were written that missed by 212 mm and by 242 mm on an independent twin."""
-    given, program = f"{world_entry()}, {UFRAME}", ls_program(tmp_path)
+    entries, program = f"{world_entry()}, {UFRAME}", ls_program(tmp_path)
     for frame, tool, parameter in (
         (world_entry(), f"of: flange, target: tip, {UTOOL}", "frames"),
         ("of: base, translation: [420, -150, -120], wpr: [0, 0, 10]", f"of: flange, target: tip, {UTOOL}", "frames"),
-        (given, "of: flange, target: tip", "tools"),
-        (given, "of: flange, translation: [0, 0, 120]", "tools"),
+        (entries, "of: flange, target: tip", "tools"),
+        (entries, "of: flange, translation: [0, 0, 120]", "tools"),
     ):
         places = fanuc_cell(tmp_path, frame, tool)
         with pytest.raises(InputError, match="nothing says which numbers the controller has") as refusal:
@@ -240,18 +242,18 @@ def test_a_measured_place_does_not_say_what_the_controller_has(tmp_path: Path) -
 def test_with_the_numbers_of_the_controller_the_real_robot_goes_there(tmp_path: Path) -> None:
     """The model of the test is the real robot here, so that nothing is left but the digits of the program."""
     places, robot = fanuc_cell(tmp_path, f"{world_entry()}, {UFRAME}", f"of: flange, target: tip, {UTOOL}"), fanuc()
-    made = truearm.compensate(robot, [ls_program(tmp_path)], tools=places, frames=places, **ANSWERED)
-    assert made.files[0].corrected == 5
+    result = truearm.compensate(robot, [ls_program(tmp_path)], tools=places, frames=places, **ANSWERED)
+    assert result.files[0].corrected == 5
     known = Cell(read_tools(robot, places), read_frames(robot, places))
-    wanted, (one,) = true_frame() @ made.result.corrections[0].before, made.result.corrections
-    for program, least, most in ((one.program, 0.5e-3, 3e-3), (made.as_written()[0], 0.0, 2e-6)):
-        there, _ = robot.forward(commanded(robot, program, known), frame="world", target="tip")
-        missed = np.linalg.norm(there - wanted[:, :3, 3], axis=1)
+    wanted, (correction,) = true_frame() @ result.result.corrections[0].before, result.result.corrections
+    for program, least, most in ((correction.program, 0.5e-3, 3e-3), (result.as_written()[0], 0.0, 2e-6)):
+        reached, _ = robot.forward(commanded(robot, program, known), frame="world", target="tip")
+        missed = np.linalg.norm(reached - wanted[:, :3, 3], axis=1)
         assert least <= missed.min() <= missed.max() < most
     # What was read on the pendant alone is the controller's.
     read = fanuc_cell(tmp_path, UFRAME_READ, "of: controller, translation: [0, 0, 120]")
-    made = truearm.compensate(fanuc(), [ls_program(tmp_path)], tools=read, frames=read, **ANSWERED)
-    assert made.result.frames.frames == made.result.frames.tools == "assumed"
+    result = truearm.compensate(fanuc(), [ls_program(tmp_path)], tools=read, frames=read, **ANSWERED)
+    assert result.result.frames.frames == result.result.frames.tools == "assumed"
 
 
 def test_a_rigid_motion_is_common_and_leaves_nothing() -> None:
@@ -261,26 +263,26 @@ def test_a_rigid_motion_is_common_and_leaves_nothing() -> None:
     moved = shift + (places - middle) @ rotation_from_vector(turn).T - (places - middle)
     turned = np.broadcast_to(turn, moved.shape)[:, :, None]
     moved = moved[:, :, None]
-    found = shared_motion([(places[:7], moved[:7], turned[:7]), (places[7:], moved[7:], turned[7:])])
-    assert found is not None
-    assert found.moved == pytest.approx(3e-3, rel=1e-6)
-    assert found.turned == pytest.approx(np.linalg.norm(turn), rel=1e-4)
-    assert found.remainder < 1e-9
+    result = shared_motion([(places[:7], moved[:7], turned[:7]), (places[7:], moved[7:], turned[7:])])
+    assert result is not None
+    assert result.moved == pytest.approx(3e-3, rel=1e-6)
+    assert result.turned == pytest.approx(np.linalg.norm(turn), rel=1e-4)
+    assert result.remainder < 1e-9
     assert shared_motion([(places[:3], moved[:3], turned[:3])]) is None
 
 
 def test_the_common_shift_is_told_apart_from_what_remains(tmp_path: Path) -> None:
     """The plate's frame is not turned in the base: its shift is the mean of what its targets move by."""
     frames = placed(tmp_path, "of: base, translation: [310, -110, 60]")
-    made = truearm.compensate(longer(), [plate(tmp_path)], frames=frames, **ANSWERED)
-    (one,) = made.result.corrections
-    mean = float(np.linalg.norm((one.after - one.before)[one.corrected, :3, 3].mean(axis=0)))
-    told = made.summary()["programs"][0]["shift_mm"]
-    assert told["common"] == pytest.approx(1e3 * mean, rel=1e-9)
-    assert told["mean"] - told["common"] <= told["remainder"] < told["mean"]
-    (line,) = [line for line in made.lines() if "common to its targets" in line]
-    assert f"shift {told['common']:.3f} mm" in line
-    assert f"remainder {told['remainder']:.3f} mm on average" in line
+    result = truearm.compensate(longer(), [plate(tmp_path)], frames=frames, **ANSWERED)
+    (correction,) = result.result.corrections
+    mean = float(np.linalg.norm((correction.after - correction.before)[correction.corrected, :3, 3].mean(axis=0)))
+    content = result.summary()["programs"][0]["shift_mm"]
+    assert content["common"] == pytest.approx(1e3 * mean, rel=1e-9)
+    assert content["mean"] - content["common"] <= content["remainder"] < content["mean"]
+    (line,) = [line for line in result.lines() if "common to its targets" in line]
+    assert f"shift {content['common']:.3f} mm" in line
+    assert f"remainder {content['remainder']:.3f} mm on average" in line
     # Where the base was assumed, its motion took the common part away.
     assumed = truearm.compensate(longer(), [plate(tmp_path)], **ANSWERED)
     assert not [line for line in assumed.lines() if "common to its targets" in line]
@@ -289,13 +291,13 @@ def test_the_common_shift_is_told_apart_from_what_remains(tmp_path: Path) -> Non
 def test_a_path_written_as_a_program_has_the_same_limit(tmp_path: Path) -> None:
     file = tmp_path / "path.yaml"
     file.write_text(PATH)
-    given: dict[str, Any] = {"languages": ["rapid"], "controller_kinematics": "nominal"}
-    assert truearm.path(springy(), file, **given).programs
+    options: dict[str, Any] = {"languages": ["rapid"], "controller_kinematics": "nominal"}
+    assert truearm.path(springy(), file, **options).programs
     with pytest.raises(InputError, match="larger than the errors of this robot explain") as refusal:
-        truearm.path(springy(), file, payload="120kg,0mm,0mm,50mm", out=tmp_path / "out", **given)
+        truearm.path(springy(), file, payload="120kg,0mm,0mm,50mm", out=tmp_path / "out", **options)
     assert "mm along the path: " in str(refusal.value)
     assert not (tmp_path / "out").exists()
-    made = truearm.path(springy(), file, payload="120kg,0mm,0mm,50mm", accept_correction="300mm,30deg", **given)
-    assert "corrections-large" in {notice.code for notice in made.warnings}
+    result = truearm.path(springy(), file, payload="120kg,0mm,0mm,50mm", accept_correction="300mm,30deg", **options)
+    assert "corrections-large" in {notice.code for notice in result.warnings}
     # A motion that is looked at only is not refused.
     assert truearm.path(springy(), file, payload="120kg,0mm,0mm,50mm", controller_kinematics="nominal").path.calibrated

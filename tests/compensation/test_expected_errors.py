@@ -40,9 +40,9 @@ SOME = ("pHole1", "pHole6", "pHole8")
 @pytest.fixture(scope="module")
 def robot() -> Robot:
     """A robot calibrated with so few configurations that half a millimetre is left uncertain."""
-    made = calibrate("irb120", campaign("irb120", 7, 5e-5, 4)[1], train="all").robot
-    assert made.proof is not None
-    return made
+    result = calibrate("irb120", campaign("irb120", 7, 5e-5, 4)[1], train="all").robot
+    assert result.proof is not None
+    return result
 
 
 def cell_of(robot: Robot, stands: np.ndarray) -> Cell:
@@ -58,41 +58,41 @@ def cell_of(robot: Robot, stands: np.ndarray) -> Cell:
 @pytest.mark.parametrize("measured", [True, False])
 def test_robots_drawn_from_the_covariance_miss_as_expected(robot: Robot, measured: bool) -> None:
     """The right correction of such a robot is where the targets should have gone."""
-    proof, one = robot.proof, program(*SOME)
+    proof, read = robot.proof, program(*SOME)
     assert proof is not None
-    stands = robot.base.matrix @ one.frames["wobjPlate"].matrix
-    found = corrected(robot, one, cell_of(robot, stands) if measured else Cell({}, {}))
-    expected = found.expected
+    stands = robot.base.matrix @ read.frames["wobjPlate"].matrix
+    result = corrected(robot, read, cell_of(robot, stands) if measured else Cell({}, {}))
+    expected = result.expected
     assert expected is not None
-    poses = np.array([target.form.kind == "pose" for target in one.targets]) & found.corrected
+    poses = np.array([target.form.kind == "pose" for target in read.targets]) & result.corrected
     rng = np.random.default_rng(1)
     values = {name: robot.values[name] for name in proof.names}
     before, after = [], []
     for _ in range(DRAWS):
         moved = proof.root @ rng.standard_normal(len(values))
         other = robot.with_values({n: v + float(d) for (n, v), d in zip(values.items(), moved, strict=True)})
-        right = corrected(other, one, cell_of(other, stands) if measured else Cell({}, {})).after
-        before.append(np.linalg.norm((right - found.before)[poses, :3, 3], axis=1))
-        after.append(np.linalg.norm((right - found.after)[poses, :3, 3], axis=1))
+        right = corrected(other, read, cell_of(other, stands) if measured else Cell({}, {})).after
+        before.append(np.linalg.norm((right - result.before)[poses, :3, 3], axis=1))
+        after.append(np.linalg.norm((right - result.after)[poses, :3, 3], axis=1))
     assert np.mean(after) == pytest.approx(expected.after[poses].mean(), rel=0.2)
     assert np.mean(before) == pytest.approx(expected.before[poses].mean(), rel=0.2)
     np.testing.assert_allclose(np.mean(after, axis=0), expected.after[poses], rtol=0.5)
     worse = np.mean(np.array(after) > np.array(before))
     assert worse == pytest.approx(expected.worse[poses].mean(), abs=0.05)
-    low, high = expected.drawn.interval(found.corrected, poses) or (0.0, 0.0)
+    low, high = expected.drawn.interval(result.corrected, poses) or (0.0, 0.0)
     np.testing.assert_allclose(np.percentile(np.mean(after, axis=1), [5, 95]), [low, high], rtol=0.3)
 
 
-def corrected(robot: Robot, one: Program, cell: Cell) -> Correction:
-    return corrected_programs(robot, [one], cell, choice=Choice(every=True)).corrections[0]
+def corrected(robot: Robot, read: Program, cell: Cell) -> Correction:
+    return corrected_programs(robot, [read], cell, choice=Choice(every=True)).corrections[0]
 
 
 def test_the_error_of_the_joints_counts(robot: Robot) -> None:
-    proof, one = robot.proof, program(*SOME)
+    proof, read = robot.proof, program(*SOME)
     assert proof is not None
     shaky = sealed(robot, replace(proof, joint_error=(2e-4,) * 6))
     steady = sealed(robot, replace(proof, joint_error=(0.0,) * 6))
-    errors = [corrected(made, one, Cell({}, {})).expected for made in (steady, shaky)]
+    errors = [corrected(result, read, Cell({}, {})).expected for result in (steady, shaky)]
     assert errors[0] is not None
     assert errors[1] is not None
     # Joints that err by 0.2 mrad at arms of some 0.4 m.
@@ -102,7 +102,7 @@ def test_the_error_of_the_joints_counts(robot: Robot) -> None:
 
 
 def test_what_is_not_known_is_not_said(robot: Robot) -> None:
-    proof, one = robot.proof, program(*SOME)
+    proof, read = robot.proof, program(*SOME)
     assert proof is not None
     edited = robot.with_values({"a_3": robot.values["a_3"] + 1e-5})
     place = [name for name in proof.names if name.startswith(("base", "target"))]
@@ -113,15 +113,15 @@ def test_what_is_not_known_is_not_said(robot: Robot) -> None:
         factor=tuple((0.0,) * i + (1.0,) for i in range(len(place))),
     )
     for other in (replace(robot, proof=None), edited, sealed(robot, placed)):
-        found = corrected(other, one, Cell({}, {}))
-        assert found.expected is None
-        assert found.not_better == ()
+        result = corrected(other, read, Cell({}, {}))
+        assert result.expected is None
+        assert result.not_better == ()
 
 
 def test_one_target_alone_has_no_correction_of_which_something_could_be_promised(robot: Robot) -> None:
     pose = "[[20,20,0],[-0.069237,-0.008501,0.990128,0.121572],[-1,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
-    one = program(pose, points=False)
-    found = corrected_programs(robot, [one], Cell({}, {})).corrections[0]
-    assert found.expected is not None
-    assert np.isnan(found.expected.after[0])
-    assert (found.not_better, found.kept, found.edits) == ((), {0: ALONE}, ())
+    read = program(pose, points=False)
+    result = corrected_programs(robot, [read], Cell({}, {})).corrections[0]
+    assert result.expected is not None
+    assert np.isnan(result.expected.after[0])
+    assert (result.not_better, result.kept, result.edits) == ((), {0: ALONE}, ())

@@ -41,20 +41,20 @@ def test_the_calibrated_robot_goes_where_the_nominal_one_was_meant(name: str) ->
     robot, rng = worn(nominal), np.random.default_rng(2)
     meant = nominal.random_configurations(120, rng) * 0.8
     wanted = matrices(nominal, meant)
-    found = fake_targets(robot, wanted, meant)
-    usable = np.array([status.usable for status in found.solutions.status])
+    result = fake_targets(robot, wanted, meant)
+    usable = np.array([status.usable for status in result.solutions.status])
     assert usable.mean() > 0.85  # some stretched arms do not reach as far
     # The controller, on its way from what is written to joints, and the real robot at these.
-    written = matrices(nominal, found.joints)
-    np.testing.assert_allclose(found.flange, written, atol=1e-12)
-    position, rotation = robot.world_poses(found.joints)
+    written = matrices(nominal, result.joints)
+    np.testing.assert_allclose(result.flange, written, atol=1e-12)
+    position, rotation = robot.world_poses(result.joints)
     base = robot.base
     np.testing.assert_allclose(
         position[usable], (wanted[:, :3, 3] @ base.rotation.T + np.array(base.translation))[usable], atol=1e-9
     )
     turned = np.array(Rotation.from_matrix(np.swapaxes(rotation, 1, 2) @ base.rotation @ wanted[:, :3, :3]).magnitude())
     assert turned[usable].max() < 1e-8
-    assert np.linalg.norm(found.flange[:, :3, 3] - wanted[:, :3, 3], axis=1)[usable].mean() > 5e-4
+    assert np.linalg.norm(result.flange[:, :3, 3] - wanted[:, :3, 3], axis=1)[usable].mean() > 5e-4
 
 
 @pytest.fixture(scope="module", params=["elastic", "full"])
@@ -83,22 +83,22 @@ def test_ten_thousand_targets_of_the_measured_irb120(irb120: Robot, request: pyt
     meant = resolved_configurations(nominal, np.linalg.inv(base) @ wanted @ flange, words, unknown, range(len(joints)))
     rows = np.flatnonzero(~np.isnan(meant.joints).any(axis=1))[:count]
     assert len(rows) == count
-    found = fake_targets(irb120, wanted[rows], meant.joints[rows])
-    there = np.linalg.inv(irb120.base.matrix) @ matrices(irb120, found.joints)
-    assert np.linalg.norm(there[:, :3, 3] - wanted[rows, :3, 3], axis=1).max() < 1e-9
-    turned = Rotation.from_matrix(np.swapaxes(there[:, :3, :3], 1, 2) @ wanted[rows, :3, :3]).magnitude()
+    result = fake_targets(irb120, wanted[rows], meant.joints[rows])
+    reached = np.linalg.inv(irb120.base.matrix) @ matrices(irb120, result.joints)
+    assert np.linalg.norm(reached[:, :3, 3] - wanted[rows, :3, 3], axis=1).max() < 1e-9
+    turned = Rotation.from_matrix(np.swapaxes(reached[:, :3, :3], 1, 2) @ wanted[rows, :3, :3]).magnitude()
     assert turned.max() < 1e-8
-    on_branch = np.array(branches(nominal, found.joints)) == asked[rows]
+    on_branch = np.array(branches(nominal, result.joints)) == asked[rows]
     assert on_branch.mean() >= 0.9999
     caused = {"beyond-limit", "branch-lost", "unreachable"}
-    assert all(found.solutions.status[row].value in caused for row in np.flatnonzero(~on_branch))
+    assert all(result.solutions.status[row].value in caused for row in np.flatnonzero(~on_branch))
 
 
 def test_the_nominal_robot_is_the_table_however_often_it_was_calibrated() -> None:
     robot = worn(load_robot("irb120"))
     again = robot.with_parameters(p.restarted(p.value) for p in robot.known.values())
-    for one in (robot, again):
-        nominal = nominal_robot(one)
+    for arm in (robot, again):
+        nominal = nominal_robot(arm)
         assert nominal.values["a_3"] == 0.27
         assert nominal.base.translation == (0.0, 0.0, 0.0)
 
@@ -117,6 +117,6 @@ def test_an_arm_of_seven_joints_stays_near_to_what_was_meant() -> None:
     robot = seven.with_values({"a_2": -0.4255, "theta_offset_3": 0.002, "d_6": 0.0825})
     meant = np.random.default_rng(3).uniform(-1.5, 1.5, (20, 7))
     wanted = matrices(seven, meant)
-    found = fake_targets(robot, wanted, meant)
-    assert np.abs(found.joints - meant).max() < 0.2
-    np.testing.assert_allclose(matrices(robot, found.joints), wanted, atol=1e-8)
+    result = fake_targets(robot, wanted, meant)
+    assert np.abs(result.joints - meant).max() < 0.2
+    np.testing.assert_allclose(matrices(robot, result.joints), wanted, atol=1e-8)

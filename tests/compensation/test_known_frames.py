@@ -54,69 +54,69 @@ def noisy() -> tuple[Twin, Dataset]:
     return campaign("irb120", 30, 0.05e-3, 11)
 
 
-def apart(one: Robot, other: Robot, target: str | None = None) -> float:
+def apart(first: Robot, other: Robot, target: str | None = None) -> float:
     """Return how far two robots are from each other in the instrument's frame, at most [m]."""
-    q = one.random_configurations(60, np.random.default_rng(5))
-    return float(np.abs(one.world_poses(q, target)[0] - other.world_poses(q, target)[0]).max())
+    q = first.random_configurations(60, np.random.default_rng(5))
+    return float(np.abs(first.world_poses(q, target)[0] - other.world_poses(q, target)[0]).max())
 
 
 #: What was calibrated with what held: several tests read the same calibration.
-_HELD: dict[object, Calibration] = {}
+_CALIBRATED: dict[object, Calibration] = {}
 
 
-def held(hold: list[str], folder: Path, robot: str = "irb120", **more: Any) -> Calibration:
+def calibrated_holding(hold: list[str], folder: Path, robot: str = "irb120", **more: Any) -> Calibration:
     key = (robot, *hold, *more.items())
-    if key not in _HELD:
+    if key not in _CALIBRATED:
         twin, data = exact(robot)
         frames = frames_of(twin.robot, folder / "frames.yaml")
-        _HELD[key] = calibrate(robot, data, hold=hold, frames=frames, **more)
-    return _HELD[key]
+        _CALIBRATED[key] = calibrate(robot, data, hold=hold, frames=frames, **more)
+    return _CALIBRATED[key]
 
 
 @pytest.mark.parametrize(("robot", "redundancy"), [("irb120", "prior"), ("irb120", "drop"), ("katana450", "prior")])
 def test_with_true_frames_the_flange_is_where_it_is(robot: str, redundancy: str, tmp_path: Path) -> None:
     """Base and tool known: not only the targets, the flange itself stands right in the base."""
-    found = held(["base", "targets"], tmp_path, robot, redundancy=redundancy)
+    result = calibrated_holding(["base", "targets"], tmp_path, robot, redundancy=redundancy)
     twin = exact(robot)[0].robot
-    assert found.warnings == () or {n.code for n in found.warnings} <= {"redundant", "parallel-axes"}
-    assert all(apart(found.robot, twin, target.name) < 1e-9 for target in twin.targets)
-    assert apart(found.robot, twin) < 1e-9
+    assert result.warnings == () or {n.code for n in result.warnings} <= {"redundant", "parallel-axes"}
+    assert all(apart(result.robot, twin, target.name) < 1e-9 for target in twin.targets)
+    assert apart(result.robot, twin) < 1e-9
     free = identify(library_robot(robot), exact(robot)[1], GEOMETRIC, redundancy=redundancy)  # type: ignore[arg-type]
     assert all(apart(free.robot, twin, target.name) < 1e-9 for target in twin.targets)
     assert apart(free.robot, twin) > 1e-4  # shifts of base and flange are arbitrary there
     if (robot, redundancy) == ("irb120", "drop"):
         # The height of the base is no longer redundant with the first joint.
-        dropped, still = ({r.dropped for r in fit.redundancies} for fit in (free, found.fit))
+        dropped, still = ({r.dropped for r in fit.redundancies} for fit in (free, result.fit))
         gauge = {name for name in dropped if name.rsplit("_", 1)[-1] in ("1", "6")}
         assert gauge
         assert not still & gauge
-        assert {"d_1", "theta_offset_1"} <= set(found.fit.free.names)
+        assert {"d_1", "theta_offset_1"} <= set(result.fit.free.names)
 
 
 def test_what_is_held_stays_and_the_rest_is_found(tmp_path: Path) -> None:
     for hold in (["base"], ["targets"], ["1"], ["base", "2"]):
-        found = held(hold, tmp_path)
+        result = calibrated_holding(hold, tmp_path)
         twin = exact()[0].robot
-        assert found.nominal.position is not None, hold
-        assert all(apart(found.robot, twin, target.name) < 1e-9 for target in twin.targets), hold
-        names = found.fit.held.names(found.robot)
+        assert result.nominal.position is not None, hold
+        assert all(apart(result.robot, twin, target.name) < 1e-9 for target in twin.targets), hold
+        names = result.fit.fixed.names(result.robot)
         assert names, hold
         for name in names:
             if not name.startswith("base_r"):
-                assert found.robot.values[name] == pytest.approx(twin.values[name], abs=1e-12), hold
-            assert found.fit.parameter_status(name) == "held", hold
-            assert found.robot.parameters[name].deviation is None, hold
+                assert result.robot.values[name] == pytest.approx(twin.values[name], abs=1e-12), hold
+            assert result.fit.parameter_status(name) == "held", hold
+            assert result.robot.parameters[name].deviation is None, hold
 
 
 def test_what_was_held_is_said_everywhere(tmp_path: Path) -> None:
-    found = held(["base", "1", "2", "3"], tmp_path, out=tmp_path / "out")
-    assert "Held at known places: base, target 1, target 2, target 3" in found.lines()
+    outcome = calibrated_holding(["base", "1", "2", "3"], tmp_path, out=tmp_path / "out")
+    assert "Held at known places: base, target 1, target 2, target 3" in outcome.lines()
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     assert result["held"] == ["base", "target 1", "target 2", "target 3"]
     assert {p["status"] for p in result["parameters"] if p["name"].startswith("base_")} == {"held"}
     assert "held at known places" in (tmp_path / "out" / "report.html").read_text()
-    assert ", base, 1, 2 and 3 held" in found.history or "base, 1, 2, 3 held" in found.history
-    assert "hold=['base', '1', '2', '3']" in found.command
+    assert ", base, 1, 2 and 3 held" in outcome.history or "base, 1, 2, 3 held" in outcome.history
+    assert "hold=['base', '1', '2', '3']" in outcome.command
     path = tmp_path / "out" / "calibrated.yaml"
     again = load_robot(path)
     assert again.proof is not None
@@ -124,14 +124,14 @@ def test_what_was_held_is_said_everywhere(tmp_path: Path) -> None:
     assert "target_1_x" in again.proof.held
     shown = CliRunner().invoke(program(), ["show", str(path)]).output
     assert "held at known places: base, flange" in " ".join(shown.split())
-    assert found.expected.frame == "the instrument's frame"
+    assert outcome.expected.frame == "the instrument's frame"
     path.write_text(path.read_text().replace("held: [base", "held: [bass"))
     with pytest.raises(InputError, match=r"proof\.held: nothing of this name can be held; got 'bass'"):
         load_robot(path)
 
 
 def test_the_base_stays_known_when_the_robot_is_placed_anew(tmp_path: Path) -> None:
-    first = held(["base", "targets"], tmp_path)
+    first = calibrated_holding(["base", "targets"], tmp_path)
     elsewhere = calibrate(first.robot, exact()[1], model="frames")
     assert elsewhere.robot.proof is not None
     assert elsewhere.robot.proof.held == ("base", "flange")
@@ -143,24 +143,24 @@ def test_no_base_and_no_flange_is_assumed_in_programs_where_they_were_held(tmp_p
         plate = RAPID.read([Source(Path("plate.mod"), PLATE)])
         return corrected_programs(robot, [plate], EMPTY_CELL, choice=Choice(taught=frozenset()))
 
-    made = corrected(held(["base", "targets"], tmp_path).robot)
-    assert (made.frames.tools, made.frames.frames) == ("held", "held")
-    np.testing.assert_allclose(made.frames.base, np.eye(4), atol=0)
-    np.testing.assert_allclose(made.frames.flange, np.eye(4), atol=0)
-    one, twin = made.corrections[0], exact()[0].robot
-    rows = np.flatnonzero(one.corrected)
-    tool = next(iter(one.program.tools.values())).matrix
+    result = corrected(calibrated_holding(["base", "targets"], tmp_path).robot)
+    assert (result.frames.tools, result.frames.frames) == ("held", "held")
+    np.testing.assert_allclose(result.frames.base, np.eye(4), atol=0)
+    np.testing.assert_allclose(result.frames.flange, np.eye(4), atol=0)
+    correction, twin = result.corrections[0], exact()[0].robot
+    rows = np.flatnonzero(correction.corrected)
+    tool = next(iter(correction.program.tools.values())).matrix
     # Sent there, the twin is in its own base where the program means it, which a shift of the base would spoil.
-    reached = np.linalg.inv(twin.base.matrix) @ matrices(twin, one.joints[rows]) @ tool
-    np.testing.assert_allclose(reached, one.tips[rows], atol=1e-7)
-    assert one.moved[rows].mean() > 1e-4
+    reached = np.linalg.inv(twin.base.matrix) @ matrices(twin, correction.joints[rows]) @ tool
+    np.testing.assert_allclose(reached, correction.tips[rows], atol=1e-7)
+    assert correction.moved[rows].mean() > 1e-4
     other = corrected(identify(library_robot("irb120"), exact()[1], GEOMETRIC).robot)
     assert (other.frames.tools, other.frames.frames) == ("assumed", "assumed")
     assert not np.allclose(other.frames.base, np.eye(4), atol=1e-6)
 
 
 def test_a_tool_point_that_was_held_stays_on_the_flange_in_programs(tmp_path: Path) -> None:
-    robot = held(["base", "1"], tmp_path).robot
+    robot = calibrated_holding(["base", "1"], tmp_path).robot
     base, flange = best_agreement(robot)
     np.testing.assert_allclose(base, np.eye(4), atol=0)
     point = np.array([robot.values[f"target_1_{axis}"] for axis in "xyz"])
@@ -174,15 +174,15 @@ def test_a_base_that_is_elsewhere_contradicts_the_readings(tmp_path: Path) -> No
     assert "hold-contradicts" not in {n.code for n in right.warnings}
     wrong = frames_of(twin.robot, tmp_path / "b.yaml", base=(2.0, 0.0, 0.0))
     for redundancy in ("prior", "drop"):
-        found = calibrate("irb120", data, hold=["base", "targets"], frames=wrong, redundancy=redundancy)
-        (notice,) = [n for n in found.warnings if n.code == "hold-contradicts"]
+        result = calibrate("irb120", data, hold=["base", "targets"], frames=wrong, redundancy=redundancy)
+        (notice,) = [n for n in result.warnings if n.code == "hold-contradicts"]
         assert notice.level == "error"
         assert re.search(r"with them the fit leaves \S+ mm .* with all of them found 0\.08\d* mm", notice.message)
-        assert not found.finished
+        assert not result.finished
     # A height that only another robot could have goes whole into d_1, and no reading is off.
     wrong = frames_of(twin.robot, tmp_path / "b.yaml", base=(0.0, 0.0, 12.0))
-    found = calibrate("irb120", data, hold=["base"], frames=wrong)
-    (notice,) = [n for n in found.warnings if n.code == "hold-contradicts"]
+    result = calibrate("irb120", data, hold=["base"], frames=wrong)
+    (notice,) = [n for n in result.warnings if n.code == "hold-contradicts"]
     assert re.search(r"found from the readings, the base is 1\d\.\d mm", notice.message)
 
 
@@ -192,10 +192,10 @@ def test_a_moved_base_and_held_targets_go_together(tmp_path: Path) -> None:
     position = numbered.position.copy()
     position[numbered.configuration >= 15] += [2e-3, 0.0, 1e-3]
     frames = frames_of(twin.robot, tmp_path / "frames.yaml")
-    found = calibrate(
+    result = calibrate(
         "irb120", replace(numbered, position=position), hold=["base", "targets"], frames=frames, base_changes=["16"]
     )
-    assert apart(found.robot, twin.robot) < 0.3e-3
+    assert apart(result.robot, twin.robot) < 0.3e-3
 
 
 @cache
@@ -223,14 +223,14 @@ def fixture_entries(robot: Robot) -> dict[str, Any]:
 def test_fixtures_that_are_held_locate_the_robot(tmp_path: Path) -> None:
     robot, data = touched()
     frames = cell_file(tmp_path / "cell.yaml", {}, fixture_entries(robot))
-    found = calibrate("irb120", data, model="offsets", train="all", hold=["fixtures"], frames=frames)
-    assert found.fit.gauge_freedoms == ()
-    assert "closed-loop" not in {n.code for n in found.warnings}
+    result = calibrate("irb120", data, model="offsets", train="all", hold=["fixtures"], frames=frames)
+    assert result.fit.gauge_freedoms == ()
+    assert "closed-loop" not in {n.code for n in result.warnings}
     assert all(
-        found.fit.parameter_status(p.name) == "held" for p in found.robot.parameters.values() if p.group == "fixture"
+        result.fit.parameter_status(p.name) == "held" for p in result.robot.parameters.values() if p.group == "fixture"
     )
     assert gauge_freedoms(data)
-    assert apart(found.robot, robot, found.robot.targets[0].name) < 1e-6
+    assert apart(result.robot, robot, result.robot.targets[0].name) < 1e-6
 
 
 TOOL = {"of": "flange", "translation": [0, 0, 100]}
@@ -250,9 +250,9 @@ HOLDS: list[tuple[list[str], dict[str, Any], dict[str, Any], str]] = [
 
 
 def test_contradicting_holds_are_refused(tmp_path: Path) -> None:
-    for hold, tools, frames, said in HOLDS:
+    for hold, tools, frames, words in HOLDS:
         path = cell_file(tmp_path / "frames.yaml", tools, frames)
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=words):
             calibrate("irb120", exact()[1], hold=hold, frames=path)
 
 
@@ -271,9 +271,9 @@ def test_holds_that_do_not_go_with_the_rest_are_refused(tmp_path: Path) -> None:
         ({"hold": ["base"], "frames": frames, "monte_carlo": 100}, together),
         ({"monte_carlo": 100, "bootstrap": 20}, "not with those of a bootstrap"),
     )
-    for given, said in cases:
-        with pytest.raises(InputError, match=said):
-            calibrate("irb120", exact()[1], **given)
+    for value, words in cases:
+        with pytest.raises(InputError, match=words):
+            calibrate("irb120", exact()[1], **value)
 
 
 def test_what_readings_of_fixtures_cannot_hold_is_refused(tmp_path: Path) -> None:
@@ -292,12 +292,12 @@ def test_what_readings_of_fixtures_cannot_hold_is_refused(tmp_path: Path) -> Non
 
 
 def test_a_robot_in_its_own_frame_takes_the_place_of_a_target_from_its_file(tmp_path: Path) -> None:
-    tool = held(["base"], tmp_path, model="frames")  # a tool alone, in a base that is known
+    tool = calibrated_holding(["base"], tmp_path, model="frames")  # a tool alone, in a base that is known
     assert set(tool.fit.free.names) == {f"target_{n}_{a}" for n in "123" for a in "xyz"}
     path = cell_file(tmp_path / "t.yaml", {n: {"of": "flange", "target": n} for n in "123"}, {})
-    found = calibrate(tool.robot, exact()[1], hold=["targets"], frames=path)
+    result = calibrate(tool.robot, exact()[1], hold=["targets"], frames=path)
     for name in ("target_1_x", "target_2_y", "target_3_z"):
-        assert found.robot.values[name] == tool.robot.values[name]
+        assert result.robot.values[name] == tool.robot.values[name]
 
 
 def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
@@ -306,9 +306,9 @@ def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
     frames_of(twin.robot, tmp_path / "frames.yaml")
     words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--hold", "base, 1", "--hold", "2"]
     words += ["--out", str(tmp_path / "out")]
-    done = CliRunner().invoke(program(), [*words, "--details", "--frames", str(tmp_path / "frames.yaml")])
-    assert done.exit_code == 0, done.output
-    assert "Held at known places: base, target 1, target 2" in done.output
+    outcome = CliRunner().invoke(program(), [*words, "--details", "--frames", str(tmp_path / "frames.yaml")])
+    assert outcome.exit_code == 0, outcome.output
+    assert "Held at known places: base, target 1, target 2" in outcome.output
     lacking = CliRunner().invoke(program(), words)
     assert str(lacking.exception).startswith("--hold: what is held has no numbers")
     assert str(lacking.exception).endswith("in a file with --frames.")

@@ -70,20 +70,20 @@ def texts(name: str, program: NewProgram) -> dict[Path, str]:
 def read_again(name: str, program: NewProgram) -> Program:
     sources = [Source(file, text) for file, text in texts(name, program).items()]
     assert all(source.text.isascii() for source in sources)
-    assert all(BY_NAME[name].is_one(source.text) for source in sources)
+    assert all(BY_NAME[name].recognizes(source.text) for source in sources)
     return BY_NAME[name].read(sources)
 
 
 def test_the_own_reader_finds_every_target_again(paths: dict[str, CorrectedPath]) -> None:
     for name, kind in product(BY_NAME, ("joints", "poses")):
         program = path_program(paths["front-up"], calibrated(), "weld_1", targets=kind, spacing=0.3)  # type: ignore[arg-type]
-        found = read_again(name, program)
-        assert found.skipped == (), (name, kind)
-        assert len(found.targets) == len(found.moves) == len(program), (name, kind)
-        assert [move.target for move in found.moves] == [*range(len(program))], (name, kind)
+        result = read_again(name, program)
+        assert result.skipped == (), (name, kind)
+        assert len(result.targets) == len(result.moves) == len(program), (name, kind)
+        assert [move.target for move in result.moves] == [*range(len(program))], (name, kind)
         straight = ["joint", *[{"joints": "joint", "poses": "linear"}[kind]] * (len(program) - 1)]
-        assert [move.kind for move in found.moves] == straight, (name, kind)
-        for row, target in enumerate(found.targets):
+        assert [move.kind for move in result.moves] == straight, (name, kind)
+        for row, target in enumerate(result.targets):
             form, values = target.form, np.array(target.values)
             if form.kind == "joints":
                 assert values * form.angle == pytest.approx(program.joints[row], abs=1e-6), (name, kind)
@@ -115,9 +115,9 @@ def test_an_arm_of_five_joints_has_programs_of_joint_positions(tmp_path: Path) -
     )
     program = path_program(correct_path(katana, read_path(file)), katana, "weld", targets="joints", spacing=0.2)
     for name in BY_NAME:
-        found = read_again(name, program)
-        assert len(found.targets) == len(program), name
-        for target, joints in zip(found.targets, program.joints, strict=True):
+        result = read_again(name, program)
+        assert len(result.targets) == len(program), name
+        for target, joints in zip(result.targets, program.joints, strict=True):
             assert np.array(target.values)[:5] * target.form.angle == pytest.approx(joints, abs=1e-6), name
             assert not any(target.values[5:]), name
 
@@ -129,8 +129,8 @@ def test_targets_are_some_time_apart_and_ends_of_sections_are_among_them(paths: 
     assert program.durations.sum() == pytest.approx(path.motion.time[-1])
     ends = [int(np.flatnonzero(path.planned.section == number)[-1]) for number in (1, 2)]
     for end in ends:
-        there = calibrated().controller.from_model(path.joints["geometry"][end : end + 1])
-        assert np.abs(program.joints - there).max(axis=1).min() < 1e-12
+        position = calibrated().controller.from_model(path.joints["geometry"][end : end + 1])
+        assert np.abs(program.joints - position).max(axis=1).min() < 1e-12
     assert program.blend(0) == program.blend(len(program) - 1) == 0.0
     assert 0.0 < program.blend(3) <= 1e-3
 
@@ -140,7 +140,7 @@ def test_speed_or_time_stands_in_the_program(paths: dict[str, CorrectedPath]) ->
         kind: path_program(paths["front-up"], calibrated(), "weld", targets=kind, spacing=0.2)
         for kind in ("joints", "poses")
     }
-    for name, kind, said in (
+    for name, kind, words in (
         ("rapid", "joints", "\\T:=0.2"),
         ("rapid", "poses", "\\T:=0.2"),
         ("fanuc-ls", "joints", "200msec"),
@@ -150,7 +150,7 @@ def test_speed_or_time_stands_in_the_program(paths: dict[str, CorrectedPath]) ->
         ("inform", "poses", "V=100.0"),
         ("val3", "poses", "mPath.tvel=100.0"),
     ):
-        assert said in "\n".join(texts(name, program[kind]).values()), (name, kind)
+        assert words in "\n".join(texts(name, program[kind]).values()), (name, kind)
 
 
 def test_a_corrected_program_is_not_corrected_again(paths: dict[str, CorrectedPath], tmp_path: Path) -> None:

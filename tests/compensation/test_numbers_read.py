@@ -42,9 +42,9 @@ def test_what_reads_a_place_is_found_and_what_only_looks_so_is_not(language: Lan
     if reads is None:
         return
     for line, name in lines:
-        assert name in [found[1] for found in reads.finditer(line)], line
+        assert name in [result[1] for result in reads.finditer(line)], line
     for line in NOT_READ[language.name]:
-        assert not [found for found in reads.finditer(line) if found[1] not in (None, "p", "tProbe")], line
+        assert not [result for result in reads.finditer(line) if result[1] not in (None, "p", "tProbe")], line
 
 
 def test_a_branch_that_the_correction_would_change_is_refused(tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_a_branch_that_the_correction_would_change_is_refused(tmp_path: Path) ->
     assert "`accept=numbers-read`" in str(refusal.value)
     assert not out.exists()
     assert codes(compensate(worn, [path], accept=["numbers-read"]))["numbers-read"] == "warning"
-    kept = compensate(worn, [path], keep=["p2"])
-    for honest in (kept, compensate(worn, [module(tmp_path, *moves, data=points)])):
+    result = compensate(worn, [path], keep=["p2"])
+    for honest in (result, compensate(worn, [module(tmp_path, *moves, data=points)])):
         assert "numbers-read" not in codes(honest)
         assert honest.files[0].corrected > 1

@@ -40,9 +40,9 @@ def test_a_path_is_written_with_its_correction_and_programs(truearm: Truearm, ca
         *("tip_x [mm]", "tip_y [mm]", "tip_z [mm]", "error_before [mm]", "error_after [mm]"),
     ]
     table = np.array(rows, float)
-    found = package.path(calibrated, tmp_path / "path.yaml", seed_joints=np.radians([0, 11, 23, 0, 52, 0]))
-    assert np.radians(table[:, 2:8]) == pytest.approx(found.joints, abs=1e-12)
-    assert table[:, 8:11] == pytest.approx(1e3 * found.path.planned.trajectory.position, abs=1e-5)
+    result = package.path(calibrated, tmp_path / "path.yaml", seed_joints=np.radians([0, 11, 23, 0, 52, 0]))
+    assert np.radians(table[:, 2:8]) == pytest.approx(result.joints, abs=1e-12)
+    assert table[:, 8:11] == pytest.approx(1e3 * result.path.planned.trajectory.position, abs=1e-5)
     assert table[:, 12].max() < 1e-5 < table[:, 11].mean()
     loads = (out / "loads.csv").read_text().splitlines()
     assert loads[0].startswith("time [s],force_x_1 [N],force_y_1 [N],force_z_1 [N],moment_x_1 [N m]")
@@ -62,13 +62,13 @@ def test_a_path_is_written_with_its_correction_and_programs(truearm: Truearm, ca
 
 def test_a_nominal_robot_follows_the_path_and_is_not_corrected(tmp_path: Path) -> None:
     (tmp_path / "path.yaml").write_text(PATH)
-    found = package.path(
+    result = package.path(
         "irb120", tmp_path / "path.yaml", languages=["urscript"], move_to="poses", out=tmp_path / "out"
     )
     assert not (tmp_path / "out" / "corrected.csv").exists()
-    assert "nothing to correct" in found.lines()[1]
-    assert "corrected by truearm" not in found.programs["truearm_path.script"]
-    assert found.summary()["error_mm"] == {}
+    assert "nothing to correct" in result.lines()[1]
+    assert "corrected by truearm" not in result.programs["truearm_path.script"]
+    assert result.summary()["error_mm"] == {}
 
 
 def test_poses_for_a_controller_with_kinematics_of_its_own_are_refused(tmp_path: Path) -> None:
@@ -79,20 +79,20 @@ def test_poses_for_a_controller_with_kinematics_of_its_own_are_refused(tmp_path:
     follow = partial(package.path, robot, file, languages=["urscript"], seed_joints=seed)
     assert follow().programs
     refused("controller_kinematics", "what the factory measured", follow, move_to="poses")
-    said = follow(move_to="poses", controller_kinematics="nominal")
-    assert "controller-nominal" in {notice.code for notice in said.warnings}
+    words = follow(move_to="poses", controller_kinematics="nominal")
+    assert "controller-nominal" in {notice.code for notice in words.warnings}
 
 
 def test_what_cannot_be_followed_is_refused(calibrated: Path, tmp_path: Path) -> None:
     file = tmp_path / "path.yaml"
     file.write_text(PATH)
-    for parameter, given, said in (
+    for parameter, value, words in (
         ("name", {"languages": ["rapid"], "name": "2nd"}, "cannot be called so in every language"),
         ("move_to", {"languages": ["rapid"], "move_to": "pulses"}, "no kind of targets of this name"),
         ("seed_joints", {"seed_joints": (0.0, 0.0)}, "seed_joints"),
         ("accept", {"accept": ["anything"]}, "anything"),
     ):
-        refused(parameter, said, package.path, calibrated, file, **given)
+        refused(parameter, words, package.path, calibrated, file, **value)
     refused("file", "no such file", package.path, calibrated, "way.yaml")
     file.write_text(PATH.replace("- line: [350, 60, 250]", "- line: [350, 60, 250]\n  - line: [900, 60, 250]"))
     refused("file", r"mm along the path, at .* s \(sample \d+\)", package.path, calibrated, file)

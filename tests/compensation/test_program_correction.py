@@ -74,10 +74,10 @@ EVERY = Choice(joint_targets=True)
 
 def test_joint_targets_alone_keep_to_the_base_that_was_measured() -> None:
     measured = Cell(FLANGE.tools, {"": Placed(None, Transform((0.0, 0.0, 0.001)))})
-    done = corrected_programs(IRB120, [rapid(JOINTS.format(10), JOINTS.format(30))], measured, choice=EVERY)
-    assert (done.frames.tools, done.frames.frames) == ("identified", "identified")
-    np.testing.assert_allclose(done.frames.base, Transform((0.0, 0.0, 0.001)).matrix, atol=1e-12)
-    correction = done.corrections[0]
+    result = corrected_programs(IRB120, [rapid(JOINTS.format(10), JOINTS.format(30))], measured, choice=EVERY)
+    assert (result.frames.tools, result.frames.frames) == ("identified", "identified")
+    np.testing.assert_allclose(result.frames.base, Transform((0.0, 0.0, 0.001)).matrix, atol=1e-12)
+    correction = result.corrections[0]
     # Where the nominal robot was meant to be, seen from a base that is 1 mm higher, is where the real one goes.
     position, _ = IRB120.world_poses(correction.joints)
     np.testing.assert_allclose(position, correction.tips[:, :3, 3] + [0, 0, 0.001], atol=1e-9)
@@ -98,10 +98,10 @@ def test_programs_given_together_share_the_first_frame_that_was_measured() -> No
 
 
 def test_nothing_to_correct_is_no_error() -> None:
-    done = corrected_programs(IRB120, [rapid("WaitTime 1;"), rapid(POSE.format(9000, ""))], Cell({}, {}))
-    assert [len(one.corrected) for one in done.corrections] == [0, 1]
-    assert not done.corrections[1].corrected.any()
-    assert [one.edits for one in done.corrections] == [(), ()]
+    result = corrected_programs(IRB120, [rapid("WaitTime 1;"), rapid(POSE.format(9000, ""))], Cell({}, {}))
+    assert [len(correction.corrected) for correction in result.corrections] == [0, 1]
+    assert not result.corrections[1].corrected.any()
+    assert [correction.edits for correction in result.corrections] == [(), ()]
 
 
 def test_an_arm_of_fewer_than_six_joints_is_refused() -> None:
@@ -122,9 +122,9 @@ def test_a_track_is_reported_in_millimetres(tmp_path: Path) -> None:
     program = tmp_path / "a.ls"
     program.write_text(ls(joints("1000 mm", *six), joints("1500 mm", *six), joints("1200 mm", "40 deg", *six[1:])))
     tools = cell(tmp_path, "tools:\n  flange: {of: flange}\n")
-    done = compensate(on_a_track(), [program], tools=tools, joint_targets="correct")
-    assert done.result.corrections[0].corrected.all()
-    done.save(tmp_path / "out")
+    result = compensate(on_a_track(), [program], tools=tools, joint_targets="correct")
+    assert result.result.corrections[0].corrected.all()
+    result.save(tmp_path / "out")
     page = (tmp_path / "out" / "compensation.html").read_text()
     row = page.partition("<tr><td>track</td>")[2].partition("</tr>")[0]
     low, high = (float(part.partition("<")[0]) for part in row.split('<td class="n">')[1:])
@@ -169,10 +169,10 @@ START, END = target(360, 190, 480), target(400, 240, 400)
 def split(*moves: str) -> tuple[Program, ProgramSplit]:
     """Return a program whose moves are split, read again, and how they are split."""
     whole = rapid(*moves)
-    done = corrected_programs(BADLY_WORN, [whole], FLANGE_AND_BASE)
-    assert done.corrections[0].corrected.all()
-    cut = split_program(RAPID, done.corrections[0], done.between[0], FARTHEST)
-    again = [e for e in done.corrections[0].edits if not any(c.start <= e.start < c.stop for c in cut.edits)]
+    result = corrected_programs(BADLY_WORN, [whole], FLANGE_AND_BASE)
+    assert result.corrections[0].corrected.all()
+    cut = split_program(RAPID, result.corrections[0], result.between[0], FARTHEST)
+    again = [e for e in result.corrections[0].edits if not any(c.start <= e.start < c.stop for c in cut.edits)]
     text = edited(whole.sources[0].text, [*cut.edits, *again])
     return RAPID.read([Source(Path("m.mod"), text)]), cut
 
@@ -181,17 +181,17 @@ def real_tips(position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Return where the real flange is when the controller, which knows the nominal robot, goes to poses ``(n, 3)``."""
     nominal = nominal_robot(BADLY_WORN)
     seed = inverse(nominal, position[:1], rotation[:1], branch="front-up-noflip", seed=np.zeros(6)).joints[0]
-    found = inverse(nominal, position, rotation, branch="front-up-noflip", seed=seed)
-    assert found.complete
-    return BADLY_WORN.world_poses(found.joints)[0]
+    solution = inverse(nominal, position, rotation, branch="front-up-noflip", seed=seed)
+    assert solution.complete
+    return BADLY_WORN.world_poses(solution.joints)[0]
 
 
 def interpolated(poses: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a straight way from each pose to the next."""
     places, turns = [], []
-    for one, other in pairwise(poses):
-        places.append(one[:3, 3] + shares[:, None] * (other[:3, 3] - one[:3, 3]))
-        turns.append(Slerp([0, 1], Rotation.from_matrix(np.stack([one[:3, :3], other[:3, :3]])))(shares).as_matrix())
+    for first, other in pairwise(poses):
+        places.append(first[:3, 3] + shares[:, None] * (other[:3, 3] - first[:3, 3]))
+        turns.append(Slerp([0, 1], Rotation.from_matrix(np.stack([first[:3, :3], other[:3, :3]])))(shares).as_matrix())
     return np.concatenate(places), np.concatenate(turns)
 
 
@@ -256,9 +256,9 @@ def test_a_move_that_its_language_leaves_whole_is_listed_and_not_counted() -> No
         moves = f"   1:J P[1] 20% FINE ;\n   2:L P[2] {speed} FINE ;\n   3:L P[1] 9mm/sec FINE ;\n"
         text = f"/PROG  A\n/ATTR\n/MN\n{moves}/POS\n{positions}/END\n"
         read = FANUC_LS.read([Source(Path("a.ls"), text)])
-        done = corrected_programs(worn(load_robot("lrmate200ic"), 2.0), [read], Cell({}, {}))
-        assert done.corrections[0].corrected.all()
-        cut = split_program(FANUC_LS, done.corrections[0], done.between[0], FARTHEST)
+        result = corrected_programs(worn(load_robot("lrmate200ic"), 2.0), [read], Cell({}, {}))
+        assert result.corrections[0].corrected.all()
+        cut = split_program(FANUC_LS, result.corrections[0], result.between[0], FARTHEST)
         assert (cut.moves, cut.unsplit) == (count, left)
         again = FANUC_LS.read([Source(Path("a.ls"), edited(read.sources[0].text, cut.edits))])
         assert len(again.moves) == len(read.moves) + cut.added

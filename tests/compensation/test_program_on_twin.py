@@ -75,16 +75,16 @@ def missed(twin: Twin, calibration: Calibration, program: Program, meant: np.nda
     return np.asarray(np.linalg.norm(tips - meant[rows], axis=1))
 
 
-def poses_corrected(found: Correction) -> np.ndarray:
+def poses_corrected(result: Correction) -> np.ndarray:
     """Return the corrected targets that are poses."""
-    return np.array([i for i, t in enumerate(found.program.targets) if t.form.kind == "pose" and found.corrected[i]])
+    return np.array([i for i, t in enumerate(result.program.targets) if t.form.kind == "pose" and result.corrected[i]])
 
 
 def corrected(calibration: Calibration, program: Program, cell: Cell) -> tuple[Correction, Program]:
     """Return a correction of everything, and the program that it makes."""
-    found = corrected_programs(calibration.robot, [program], cell, choice=EVERY).corrections[0]
-    assert found.corrected.all()
-    return found, plate(edited(program.sources[0].text, found.edits))
+    result = corrected_programs(calibration.robot, [program], cell, choice=EVERY).corrections[0]
+    assert result.corrected.all()
+    return result, plate(edited(program.sources[0].text, result.edits))
 
 
 def all_over_the_workspace(count: int, rng: np.random.Generator) -> str:
@@ -103,8 +103,8 @@ def all_over_the_workspace(count: int, rng: np.random.Generator) -> str:
             poses[:, :3, 3] * 1e3, quaternion_from_rotation(poses[:, :3, :3]), quadrants, elbows, strict=True
         )
     ]
-    head, rest = PLATE.split("  PROC main()")
-    return f"{head}  PROC main()\n" + "\n".join(lines) + f"\n  ENDPROC\n  PROC rest(){rest}"
+    head, remaining = PLATE.split("  PROC main()")
+    return f"{head}  PROC main()\n" + "\n".join(lines) + f"\n  ENDPROC\n  PROC rest(){remaining}"
 
 
 def given(twin: Twin, calibration: Calibration, program: Program) -> tuple[np.ndarray, Cell]:
@@ -127,14 +127,14 @@ def test_targets_are_reached_within_half_more_than_the_held_out_error(campaign: 
     held_out = float(calibration.validation.position_norms.mean())
     program = plate(all_over_the_workspace(150, np.random.default_rng(7)))
     stands, cell = given(twin, calibration, program)
-    found = corrected_programs(calibration.robot, [program], cell, choice=EVERY).corrections[0]
-    after = plate(edited(program.sources[0].text, found.edits))
-    meant = (stands @ found.before)[:, :3, 3]
-    for part in (poses_corrected(found), poses_corrected(found)[150:]):
+    result = corrected_programs(calibration.robot, [program], cell, choice=EVERY).corrections[0]
+    after = plate(edited(program.sources[0].text, result.edits))
+    meant = (stands @ result.before)[:, :3, 3]
+    for part in (poses_corrected(result), poses_corrected(result)[150:]):
         errors = [missed(twin, calibration, one, meant, part).mean() for one in (program, after)]
         assert errors[1] < 1.5 * held_out
         assert errors[0] > 8 * errors[1]
-    assert len(poses_corrected(found)) > 170
+    assert len(poses_corrected(result)) > 170
 
 
 def test_without_frames_targets_are_right_to_each_other(campaign: tuple[Twin, Calibration]) -> None:
@@ -142,12 +142,12 @@ def test_without_frames_targets_are_right_to_each_other(campaign: tuple[Twin, Ca
     twin, calibration = campaign
     assert calibration.validation is not None
     program = plate(PLATE)
-    found, after = corrected(calibration, program, Cell({}, {}))
-    rows = poses_corrected(found)
+    result, after = corrected(calibration, program, Cell({}, {}))
+    rows = poses_corrected(result)
     shapes = []
-    for one in (program, after):
-        tips = twin.frames(commanded(calibration.robot, one)[rows])["1"][:, :3, 3]
-        shapes.append(fitted(tips, found.before[rows, :3, 3]).mean())
+    for shown in (program, after):
+        tips = twin.frames(commanded(calibration.robot, shown)[rows])["1"][:, :3, 3]
+        shapes.append(fitted(tips, result.before[rows, :3, 3]).mean())
     assert shapes[1] < 1.5 * float(calibration.validation.position_norms.mean())
     assert shapes[1] < 0.4 * shapes[0]
 
@@ -195,10 +195,10 @@ def test_a_correction_that_knows_the_force_is_five_times_better_under_it(
     stands, _ = given(twin, calibration, plate(PLATE))
     errors = []
     for wrenches in ((), (TargetWrench((), (), wrench),)):
-        found = with_forces(pushed_campaign, wrenches).corrections[0]
-        after = plate(edited(found.program.sources[0].text, found.edits))
-        meant = (stands @ found.before)[:, :3, 3]
-        errors.append(missed(pushed, calibration, after, meant, poses_corrected(found)).mean())
+        result = with_forces(pushed_campaign, wrenches).corrections[0]
+        after = plate(edited(result.program.sources[0].text, result.edits))
+        meant = (stands @ result.before)[:, :3, 3]
+        errors.append(missed(pushed, calibration, after, meant, poses_corrected(result)).mean())
     assert errors[0] > 5 * errors[1]
     assert errors[1] < 0.05e-3
 
@@ -247,8 +247,8 @@ def test_targets_count_before_tools_and_tools_before_all(tmp_path: Path) -> None
         "  - {tools: [tProbe], force: [5, 0, 0]}\n",
     )
     program = plate(PLATE)
-    (found,) = wrenches_of_targets([program], [*some, TargetWrench((), (), Wrench((1.0, 0.0, 0.0)))])
-    by_name = dict(zip([target.name for target in program.targets], found, strict=True))
+    (result,) = wrenches_of_targets([program], [*some, TargetWrench((), (), Wrench((1.0, 0.0, 0.0)))])
+    by_name = dict(zip([target.name for target in program.targets], result, strict=True))
     assert by_name["pHole1"] == by_name["pHole2"] == Wrench((0.0, 0.0, 80.0), (0.0, 0.0, 1.5), "tool")
     tools = {target.name: target.tool for target in program.targets}
     assert by_name["pHole3"] == Wrench((5.0, 0.0, 0.0))
@@ -264,7 +264,7 @@ def test_units_are_those_of_the_file_and_what_is_no_wrench_is_refused(tmp_path: 
     (one,) = read(tmp_path, "  - {tools: [tProbe], force: [0, 0, 0.08], moment: [0, 0, 1500]}\n", head)
     assert one.wrench.force[2] == pytest.approx(80.0)
     assert one.wrench.moment[2] == pytest.approx(1.5)
-    for head, entry, said in (
+    for head, entry, words in (
         (HEAD, "", "the file has no wrenches"),
         (PLAIN, "{tools: [t], force: [0, 0, 8]}", "units.force: no unit of a force is given"),
         (PLAIN, "{tools: [t], moment: [0, 0, 8]}", "units.moment: no unit of a moment is given"),
@@ -278,12 +278,12 @@ def test_units_are_those_of_the_file_and_what_is_no_wrench_is_refused(tmp_path: 
     ):
         with pytest.raises(InputError) as refusal:
             read(tmp_path, f"  - {entry}\n" if entry else "", head)
-        assert said in str(refusal.value)
+        assert words in str(refusal.value)
         assert "cell.yaml" in str(refusal.value)
 
 
 def test_names_that_fit_nothing_or_twice_are_refused(tmp_path: Path) -> None:
-    for entries, said in (
+    for entries, words in (
         (["{targets: [pHole99], force: [0, 0, 8]}"], "wrenches[1]: no target of the programs has this name"),
         (["{tools: [tProb], force: [0, 0, 8]}"], "no target of the programs has this tool; got 'tProb'"),
         (
@@ -292,8 +292,8 @@ def test_names_that_fit_nothing_or_twice_are_refused(tmp_path: Path) -> None:
         ),
     ):
         with pytest.raises(InputError) as refusal:
-            wrenches_of_targets([plate(PLATE)], read(tmp_path, "".join(f"  - {one}\n" for one in entries)))
-        assert said in str(refusal.value)
+            wrenches_of_targets([plate(PLATE)], read(tmp_path, "".join(f"  - {entry}\n" for entry in entries)))
+        assert words in str(refusal.value)
         assert "cell.yaml, wrenches[" in str(refusal.value)
 
 
@@ -302,10 +302,10 @@ def test_too_many_different_forces_are_refused(
 ) -> None:
     """Every one is another robot, and takes a tenth of a second."""
     monkeypatch.setenv("TRUEARM_LIMITS", "wrenches=1")
-    one, other = (TargetWrench((name,), (), Wrench((0.0, y, 0.0))) for name, y in (("pHole1", 5.0), ("pHole2", 6.0)))
-    assert with_forces(pushed_campaign, (one,)).pushed
+    first, other = (TargetWrench((name,), (), Wrench((0.0, y, 0.0))) for name, y in (("pHole1", 5.0), ("pHole2", 6.0)))
+    assert with_forces(pushed_campaign, (first,)).pushed
     with pytest.raises(InputError, match="there are too many different forces for one run; got '2 forces'"):
-        with_forces(pushed_campaign, (one, other))
+        with_forces(pushed_campaign, (first, other))
 
 
 #: Deviation of readings [m] of calibrations that know little.
@@ -339,17 +339,17 @@ def on_the_plate(twin: Twin, calibration: Calibration, folder: Path, **how: Any)
         'tools:\n  tProbe: {of: flange, target: "1"}\n'
         f"frames:\n  wobjPlate: {{of: world, translation: [{place}], quaternion: [{quaternion}]}}\n",
     )
-    given: dict[str, Any] = {"tools": places, "frames": places, "joint_targets": "correct"}
-    return compensate(calibration.robot, [plate_file(folder)], **given, **how)
+    options: dict[str, Any] = {"tools": places, "frames": places, "joint_targets": "correct"}
+    return compensate(calibration.robot, [plate_file(folder)], **options, **how)
 
 
 def missed_by(twin: Twin, done: ProgramCorrection) -> tuple[float, float]:
     """Return how far the twin is from the poses of the plate on average [m], with the original and the new program."""
-    found = done.result.corrections[0]
-    rows = [row for row, target in enumerate(found.program.targets) if target.form.kind == "pose"]
-    meant = (stands(twin) @ found.before)[rows, :3, 3]
+    result = done.result.corrections[0]
+    rows = [row for row, target in enumerate(result.program.targets) if target.form.kind == "pose"]
+    meant = (stands(twin) @ result.before)[rows, :3, 3]
     tips = [
-        twin.frames(commanded(done.robot, one)[rows])["1"][:, :3, 3] for one in (found.program, done.as_written()[0])
+        twin.frames(commanded(done.robot, one)[rows])["1"][:, :3, 3] for one in (result.program, done.as_written()[0])
     ]
     before, after = (float(np.linalg.norm(tip - meant, axis=1).mean()) for tip in tips)
     return before, after
@@ -363,24 +363,24 @@ def test_a_program_that_would_get_worse_stays_as_it_was(tmp_path: Path) -> None:
     everything = on_the_plate(twin, calibration, tmp_path, accept=["not-better-here"])
     before, after = missed_by(twin, everything)
     assert after > 1.1 * before
-    done = on_the_plate(twin, calibration, tmp_path)
-    assert missed_by(twin, done)[1] == pytest.approx(before, rel=0.01)
-    assert {"not-better-here", "narrow-data"} <= {notice.code for notice in done.warnings}
-    (notice,) = [notice for notice in done.warnings if notice.code == "not-better-here"]
+    outcome = on_the_plate(twin, calibration, tmp_path)
+    assert missed_by(twin, outcome)[1] == pytest.approx(before, rel=0.01)
+    assert {"not-better-here", "narrow-data"} <= {notice.code for notice in outcome.warnings}
+    (notice,) = [notice for notice in outcome.warnings if notice.code == "not-better-here"]
     assert "stay as before" in notice.message
     assert "outside of what was measured" in notice.message
 
 
 def test_a_program_that_gets_better_is_corrected_all_the_same(tmp_path: Path) -> None:
     twin, calibration = far_from_the_plate(8)
-    done = on_the_plate(twin, calibration, tmp_path)
-    before, after = missed_by(twin, done)
+    outcome = on_the_plate(twin, calibration, tmp_path)
+    before, after = missed_by(twin, outcome)
     assert after < 0.2 * before
-    assert done.files[0].corrected == done.files[0].targets
-    assert "not-better-here" not in {notice.code for notice in done.warnings}
-    assert done.files[0].expected is not None
+    assert outcome.files[0].corrected == outcome.files[0].targets
+    assert "not-better-here" not in {notice.code for notice in outcome.warnings}
+    assert outcome.files[0].expected is not None
     # It knows that it is not known to 0.03 mm here, as the held-out configurations would have it.
-    assert 0.3e-3 < done.files[0].expected[1].mean() < 3e-3
+    assert 0.3e-3 < outcome.files[0].expected[1].mean() < 3e-3
 
 
 def test_three_configurations_correct_nothing(tmp_path: Path) -> None:

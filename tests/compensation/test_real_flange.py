@@ -40,21 +40,21 @@ PLATE: Final = np.array([0.31, -0.11, 0.06])
 
 
 def small(motion: np.ndarray) -> np.ndarray:
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = Rotation.from_rotvec(motion[3:]).as_matrix(), motion[:3]
-    return made
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = Rotation.from_rotvec(motion[3:]).as_matrix(), motion[:3]
+    return matrix
 
 
 def links(rng: np.random.Generator) -> list[np.ndarray]:
     """Return the links of a robot whose geometry is wrong by 0.1 to 0.5 mm and 0.02 to 0.05 deg."""
     size = np.repeat([rng.uniform(0.1e-3, 0.5e-3), math.radians(rng.uniform(0.02, 0.05))], 3)
-    made = []
+    matrices_made = []
     for alpha, a, zero, d in TABLE:
         one, two = np.eye(4), np.eye(4)
         one[:3, :3], one[0, 3] = Rotation.from_euler("x", alpha, degrees=True).as_matrix(), a / 1e3
         two[:3, :3], two[2, 3] = Rotation.from_euler("z", zero, degrees=True).as_matrix(), d / 1e3
-        made.append(one @ two @ small(size * rng.standard_normal(6)))
-    return [*made, small(size * rng.standard_normal(6))]
+        matrices_made.append(one @ two @ small(size * rng.standard_normal(6)))
+    return [*matrices_made, small(size * rng.standard_normal(6))]
 
 
 def flange(arm: list[np.ndarray], joints: np.ndarray) -> np.ndarray:
@@ -113,14 +113,14 @@ class Promise:
     interval: tuple[float, float]
 
     @property
-    def held(self) -> bool:
+    def is_met(self) -> bool:
         return self.interval[0] <= self.missed <= self.interval[1]
 
 
 def promise(seed: int, spread: float, *, tool: str = "drawing", frame: bool = False) -> Promise:
     """Correct a program for a robot, and drive it."""
-    here = cell(seed)
-    robot, places = here.robot, Cell({}, {})
+    workcell = cell(seed)
+    robot, places = workcell.robot, Cell({}, {})
     if tool == "target":
         x, y, z = (robot.values[f"target_1_{axis}"] for axis in "xyz")
         places.tools["tprobe"] = Placed(None, Transform((x, y, z)))
@@ -128,22 +128,22 @@ def promise(seed: int, spread: float, *, tool: str = "drawing", frame: bool = Fa
         places.tools["tprobe"] = Placed(None, Transform((0.0, 0.0, 0.125)))
     stands = small(np.array([*PLATE, 0.0, 0.0, 0.0]))
     if frame:
-        there = np.linalg.inv(robot.base.matrix) @ here.base @ stands
-        places.frames["wobjplate"] = Placed(None, Transform.from_matrix(there[:3, :3], there[:3, 3]))
-    one = RAPID.read([Source(Path("p.mod"), program(spread, np.random.default_rng(5000 + seed)))])
-    found = corrected_programs(robot, [one], places, choice=Choice(taught=frozenset())).corrections[0]
-    known = found.expected
+        reached = np.linalg.inv(robot.base.matrix) @ workcell.base @ stands
+        places.frames["wobjplate"] = Placed(None, Transform.from_matrix(reached[:3, :3], reached[:3, 3]))
+    read = RAPID.read([Source(Path("p.mod"), program(spread, np.random.default_rng(5000 + seed)))])
+    result = corrected_programs(robot, [read], places, choice=Choice(taught=frozenset())).corrections[0]
+    known = result.expected
     assert known is not None
-    tip = here.reflector if tool == "target" else TIP
+    tip = workcell.reflector if tool == "target" else TIP
     rows = np.isfinite(known.before)  # not those out of reach
-    tips = (flange(here.arm, found.joints[rows]) @ [*tip, 1.0])[:, :3]
-    meant = (stands @ found.before[rows])[:, :3, 3]
+    tips = (flange(workcell.arm, result.joints[rows]) @ [*tip, 1.0])[:, :3]
+    meant = (stands @ result.before[rows])[:, :3, 3]
     if not frame:
         tips, meant = tips - tips.mean(axis=0), meant - meant.mean(axis=0)
         tips = Rotation.align_vectors(meant, tips)[0].apply(tips)
-    interval = known.drawn.interval(found.corrected, rows)
+    interval = known.drawn.interval(result.corrected, rows)
     assert interval is not None
-    expected = np.where(found.corrected, known.after, known.before)[rows]
+    expected = np.where(result.corrected, known.after, known.before)[rows]
     return Promise(float(np.linalg.norm(tips - meant, axis=1).mean()), float(expected.mean()), interval)
 
 
@@ -152,31 +152,31 @@ def promise(seed: int, spread: float, *, tool: str = "drawing", frame: bool = Fa
     [(5, "drawing", False), (20, "drawing", False), (20, "drawing", True), (20, "numbers", False)],
 )
 def test_programs_miss_as_promised_where_nobody_measured_the_tool(spread: float, tool: str, frame: bool) -> None:
-    made = [promise(seed, spread, tool=tool, frame=frame) for seed in range(ROBOTS)]
-    assert sum(one.held for one in made) >= ROBOTS - 1
-    assert 0.5 < np.mean([one.missed for one in made]) / np.mean([one.expected for one in made]) < 2.0
+    promises = [promise(seed, spread, tool=tool, frame=frame) for seed in range(ROBOTS)]
+    assert sum(one.is_met for one in promises) >= ROBOTS - 1
+    assert 0.5 < np.mean([one.missed for one in promises]) / np.mean([one.expected for one in promises]) < 2.0
 
 
 @pytest.mark.parametrize(("spread", "tool"), [(0, "drawing"), (20, "target")])
 def test_what_the_flange_does_not_move_is_promised_as_sharply_as_before(spread: float, tool: str) -> None:
     made = [promise(seed, spread, tool=tool) for seed in range(ROBOTS)]
-    assert sum(one.held for one in made) >= ROBOTS - 2
+    assert sum(one.is_met for one in made) >= ROBOTS - 2
     assert max(one.expected for one in made) == REPEATABILITY
     assert max(one.missed for one in made) < 0.01e-3
 
 
 def test_notices_say_that_the_tool_is_not_known() -> None:
     robot = cell(0).robot
-    one = RAPID.read([Source(Path("p.mod"), program(20, np.random.default_rng(5000)))])
-    told = {}
+    read = RAPID.read([Source(Path("p.mod"), program(20, np.random.default_rng(5000)))])
+    levels = {}
     for name, arm in (("known", robot), ("unproven", replace(robot, proof=None))):
-        result = corrected_programs(arm, [one], Cell({}, {}), choice=Choice(taught=frozenset()))
-        told[name] = {notice.code: notice.message for notice in check_correction(arm, result)}
-    assert told["known"]["tools-assumed"].endswith(
+        result = corrected_programs(arm, [read], Cell({}, {}), choice=Choice(taught=frozenset()))
+        levels[name] = {notice.code: notice.message for notice in check_correction(arm, result)}
+    assert levels["known"]["tools-assumed"].endswith(
         "No reading tells where it really is; the errors to expect contain that."
     )
-    assert "give `tools`, or measure more" in told["known"]["not-better-here"]
-    assert "errors to expect" not in told["unproven"]["tools-assumed"]
+    assert "give `tools`, or measure more" in levels["known"]["not-better-here"]
+    assert "errors to expect" not in levels["unproven"]["tools-assumed"]
 
 
 def test_the_flange_is_as_uncertain_as_the_arm_is_found_to_be_inaccurate() -> None:
@@ -184,20 +184,20 @@ def test_the_flange_is_as_uncertain_as_the_arm_is_found_to_be_inaccurate() -> No
     # Priors are 1 mm and 0.1 deg. A robot as inaccurate as them, and one of which nothing is known:
     robot = calibrate("irb120", campaign("irb120", 40, 2e-5, 3)[1], train="all").robot
     prior = np.array([1e-3, 1e-3, 2e-3, *np.radians([0.1, 0.1, 0.2])]) / math.sqrt(2.0)
-    as_found = np.diag(flange_spread(robot)) / prior
-    assert (np.abs(np.log(as_found)) < math.log(2.0)).all()
+    spread = np.diag(flange_spread(robot)) / prior
+    assert (np.abs(np.log(spread)) < math.log(2.0)).all()
     np.testing.assert_allclose(flange_spread(replace(robot, proof=None)), np.diag(prior), atol=1e-15)
     # The same with all deviations a quarter as large.
     quarter = {name: v + (robot.values[name] - v) / 4.0 for name, v in nominal.values.items()}
-    np.testing.assert_allclose(np.diag(flange_spread(robot.with_values(quarter))), as_found * prior / 4.0, rtol=1e-9)
+    np.testing.assert_allclose(np.diag(flange_spread(robot.with_values(quarter))), spread * prior / 4.0, rtol=1e-9)
 
 
 def test_a_target_that_was_held_stays_where_it_is_on_the_real_flange() -> None:
     robot = calibrate("irb120", campaign("irb120", 40, 2e-5, 3)[1], train="all").robot
     assert robot.proof is not None
-    one = [f"target_1_{axis}" for axis in "xyz"]
-    held = replace(robot, proof=replace(robot.proof, held=tuple(one)))
-    place, spread = np.array([robot.values[name] for name in one]), flange_spread(held)
+    axes = [f"target_1_{axis}" for axis in "xyz"]
+    edited = replace(robot, proof=replace(robot.proof, held=tuple(axes)))
+    place, spread = np.array([robot.values[name] for name in axes]), flange_spread(edited)
     moved = spread[:3] + np.cross(spread[3:], place[:, None], axis=0)
     np.testing.assert_allclose(moved, 0.0, atol=1e-15)
     assert np.linalg.norm(spread[3:], axis=0).max() > math.radians(0.02)

@@ -42,6 +42,6 @@ def cell(folder: Path, entries: str, name: str = "cell.yaml") -> Path:
     return path
 
 
-def codes(made: truearm.ProgramCorrection) -> dict[str, str]:
+def codes(result: truearm.ProgramCorrection) -> dict[str, str]:
     """Return the codes and levels of what is warned of."""
-    return {notice.code: notice.level for notice in made.warnings}
+    return {notice.code: notice.level for notice in result.warnings}

@@ -274,9 +274,9 @@ def test_files_that_are_no_image_are_refused(tmp_path: Path) -> None:
     for ending in ("png", "jpg", "tif"):
         path = saved(tmp_path / f"page.{ending}", usual())
         content = path.read_bytes()
-        for kept in (20, 200, len(content) // 2):
-            path.write_bytes(content[:kept])
-            assert none in told_of(path), (ending, kept)
+        for length in (20, 200, len(content) // 2):
+            path.write_bytes(content[:length])
+            assert none in told_of(path), (ending, length)
 
 
 def test_images_of_other_kinds_and_sizes_are_refused(tmp_path: Path) -> None:
@@ -319,23 +319,23 @@ NO_CIRCLE: dict[str, Callable[[], NDArray[np.uint8]]] = {
 
 
 def test_pages_without_one_whole_circle_are_refused(tmp_path: Path) -> None:
-    def told(page: NDArray[np.uint8]) -> str:
+    def refusal_of(page: NDArray[np.uint8]) -> str:
         return told_of(saved(tmp_path / "page.png", page))
 
     for noise in (0.0, 3.0):
         empty = scanned(0 * line(), noise=noise, specks=100)
-        assert "page.png: nothing is drawn on the page but specks or letters" in told(empty)
-    assert "the page is dark" in told(255 - usual())
-    for what, draw in NO_CIRCLE.items():
-        said = "there is no circle on the page; allowed: a line over at least half a turn"
-        assert said in told(draw()), what
+        assert "page.png: nothing is drawn on the page but specks or letters" in refusal_of(empty)
+    assert "the page is dark" in refusal_of(255 - usual())
+    for case, draw in NO_CIRCLE.items():
+        words = "there is no circle on the page; allowed: a line over at least half a turn"
+        assert words in refusal_of(draw()), case
     for centre in ((0.018, 0.026), (0.04, 0.026), (0.027, 0.015), (0.0201, 0.026)):
         cut = scanned(0.7 * line(shape=even, centre=np.array(centre)))
-        assert "the circle is cut by the edge of the page; got 'radius 20.0 mm about x" in told(cut), centre
+        assert "the circle is cut by the edge of the page; got 'radius 20.0 mm about x" in refusal_of(cut), centre
     for smaller, aside in ((8e-3, 0.0), (0.0, 6e-3)):
-        assert "several circles are drawn on the page; got 'radius" in told(two_lines(smaller, aside))
+        assert "several circles are drawn on the page; got 'radius" in refusal_of(two_lines(smaller, aside))
     for smaller, aside in ((1e-3, 0.0), (0.0, 1e-3)):  # drawn twice
-        assert "another line, or writing, runs along the circle" in told(two_lines(smaller, aside))
+        assert "another line, or writing, runs along the circle" in refusal_of(two_lines(smaller, aside))
 
 
 def test_the_image_libraries_are_loaded_when_a_page_is_read() -> None:
@@ -343,8 +343,8 @@ def test_the_image_libraries_are_loaded_when_a_page_is_read() -> None:
         "import sys, truearm.drawn_circle.scan\n"
         "print([m for m in ('PIL', 'skimage', 'scipy.ndimage') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
 
 
 # -- configurations ----------------------------------------------------------------------------------------

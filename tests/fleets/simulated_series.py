@@ -46,12 +46,12 @@ class Campaign:
 @cache
 def campaign(configurations: int = 30, seed: int = 0, robot: str = "irb120") -> Campaign:
     """Return a campaign with configurations drawn evenly."""
-    made = at_station(load_robot(robot), DEFAULT_TOOL)
-    free = named_model("geometric").free(made)
-    q = made.random_configurations(configurations, np.random.default_rng(seed))
+    arm = at_station(load_robot(robot), DEFAULT_TOOL)
+    free = named_model("geometric").free(arm)
+    q = arm.random_configurations(configurations, np.random.default_rng(seed))
     blocks = [
-        made.position_jacobian(made.forward_kinematics(q, target.name), q, free.names).reshape(len(free.names), -1)
-        for target in made.targets
+        arm.position_jacobian(arm.forward_kinematics(q, target.name), q, free.names).reshape(len(free.names), -1)
+        for target in arm.targets
     ]
     return Campaign(free.parameters, np.concatenate(blocks, axis=1).T)
 
@@ -77,10 +77,10 @@ def calibrations(of: Campaign, noise: float = 3e-5) -> Calibrations:
     return Calibrations(of, (gain @ weighted)[np.ix_(own, own)], gain[own], posterior[np.ix_(own, own)])
 
 
-def kind_of(told: list[Row]) -> Kind:
+def kind_of(measured: list[Row]) -> Kind:
     """Return robots of one kind as arrays."""
-    gathered = Gathered(told[0].robot)
-    for row in told:
+    gathered = Gathered(measured[0].robot)
+    for row in measured:
         gathered.add(row)
     return gathered.kind
 
@@ -88,7 +88,7 @@ def kind_of(told: list[Row]) -> Kind:
 def rows(
     truth: Array,
     rng: np.random.Generator,
-    how: Calibrations | None = None,
+    calibrated: Calibrations | None = None,
     *,
     names: list[str] | None = None,
     of: str | None = None,
@@ -96,11 +96,14 @@ def rows(
     correlated: bool = True,
 ) -> list[Row]:
     """Return rows of robots with true differences in priors ``(robots, parameters of the arm)``."""
-    how = how or calibrations(campaign())
-    own = [how.campaign.parameters[i] for i in how.campaign.own]
-    found = truth @ how.resolution.T + rng.standard_normal((len(truth), how.scatter.shape[1])) @ how.scatter.T
-    lower = tuple(how.covariance[np.tril_indices(len(own))].tolist()) if correlated else ()
-    deviation = np.sqrt(np.diag(how.covariance))
+    calibrated = calibrated or calibrations(campaign())
+    own = [calibrated.campaign.parameters[i] for i in calibrated.campaign.own]
+    estimates = (
+        truth @ calibrated.resolution.T
+        + rng.standard_normal((len(truth), calibrated.scatter.shape[1])) @ calibrated.scatter.T
+    )
+    lower = tuple(calibrated.covariance[np.tril_indices(len(own))].tolist()) if correlated else ()
+    deviation = np.sqrt(np.diag(calibrated.covariance))
     return [
         Row(
             name=names[number] if names else f"robot-{number + 1}",
@@ -110,12 +113,12 @@ def rows(
             parameters=FoundParameters.of(
                 {
                     p.name: FoundParameter(p.unit, p.nominal + p.prior * x, p.prior * d, p.nominal, p.prior)
-                    for p, x, d in zip(own, one, deviation.tolist(), strict=True)
+                    for p, x, d in zip(own, values, deviation.tolist(), strict=True)
                 }
             ),
             fit_status="converged",
             robot="irb120",
             covariance=lower,
         )
-        for number, one in enumerate(found.tolist())
+        for number, values in enumerate(estimates.tolist())
     ]

@@ -15,7 +15,7 @@ import pytest
 from tests.expecting import known
 from tests.fleets.simulated_series import Calibrations, calibrations, campaign, kind_of, rows
 
-from truearm.engine.document.document import held_by, lines_of
+from truearm.engine.document.document import json_of, lines_of
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot_file.reading import read_robot
@@ -40,10 +40,10 @@ def drawn(robots: int, rng: np.random.Generator, size: float = 1.0, **off: float
 
 def changing(**rates: float) -> Array:
     """Return changes in priors a month."""
-    made = np.zeros(COUNT)
+    rates_of_all = np.zeros(COUNT)
     for name, rate in rates.items():
-        made[NAMES.index(name)] = rate
-    return made
+        rates_of_all[NAMES.index(name)] = rate
+    return rates_of_all
 
 
 # -- quantiles ---------------------------------------------------------------------------------------------
@@ -55,9 +55,9 @@ def test_the_interval_of_a_quantile_covers_it_in_95_of_100_series(robots: int, s
     truth = -np.log(1.0 - share)  # of the exponential distribution
     covered = 0
     for _ in range(400):
-        (found,) = quantiles(rng.exponential(size=robots), (share,))
-        assert known(found.low) <= known(found.value) <= known(found.high)
-        covered += known(found.low) <= truth <= known(found.high)
+        (quantile,) = quantiles(rng.exponential(size=robots), (share,))
+        assert known(quantile.low) <= known(quantile.value) <= known(quantile.high)
+        covered += known(quantile.low) <= truth <= known(quantile.high)
     assert covered >= 400 * 0.93
 
 
@@ -67,9 +67,9 @@ def test_what_few_robots_cannot_tell_is_not_told() -> None:
     assert (ninety.value, ninety.needed) == (None, 36)
     for share in (0.5, 0.9, 0.95):
         needed = quantiles(np.arange(3.0), (share,))[0].needed
-        for robots, told in ((needed, True), (needed - 1, False)):
-            (found,) = quantiles(np.arange(float(robots)), (share,))
-            assert (found.low is not None and found.high is not None) == told
+        for robots, is_known in ((needed, True), (needed - 1, False)):
+            (quantile,) = quantiles(np.arange(float(robots)), (share,))
+            assert (quantile.low is not None and quantile.high is not None) == is_known
 
 
 def test_the_share_of_robots_that_fail() -> None:
@@ -84,14 +84,19 @@ def test_the_share_of_robots_that_fail() -> None:
 def test_intervals_cover_the_true_spread_and_mean(robots: int, noise: float) -> None:
     rng = np.random.default_rng(1)
     scale = np.where(np.arange(COUNT) % 2, 0.5, 1.5)
-    how = calibrations(campaign(20, 1), noise)
+    calibrated = calibrations(campaign(20, 1), noise)
     spread, mean = [], []
     for _ in range(40):
-        kind = kind_of(rows(rng.standard_normal((robots, COUNT)) * scale, rng, how))
-        for one, factor in zip(spreads(kind), scale, strict=True):
-            if one.low is not None and one.high is not None and one.mean_low is not None and one.mean_high is not None:
-                spread.append(one.low <= factor * one.prior <= one.high)
-                mean.append(one.mean_low <= 0.0 <= one.mean_high)
+        kind = kind_of(rows(rng.standard_normal((robots, COUNT)) * scale, rng, calibrated))
+        for parameter, factor in zip(spreads(kind), scale, strict=True):
+            if (
+                parameter.low is not None
+                and parameter.high is not None
+                and parameter.mean_low is not None
+                and parameter.mean_high is not None
+            ):
+                spread.append(parameter.low <= factor * parameter.prior <= parameter.high)
+                mean.append(parameter.mean_low <= 0.0 <= parameter.mean_high)
     assert len(spread) > 40 * 12
     assert 0.92 <= np.mean(spread) <= 0.98
     assert 0.92 <= np.mean(mean) <= 0.98
@@ -99,14 +104,14 @@ def test_intervals_cover_the_true_spread_and_mean(robots: int, noise: float) -> 
 
 def test_what_the_estimates_are_uncertain_by_is_taken_off() -> None:
     rng = np.random.default_rng(2)
-    how = calibrations(campaign(20, 1), 2e-4)
-    kind = kind_of(rows(0.1 * rng.standard_normal((300, COUNT)), rng, how))
+    calibrated = calibrations(campaign(20, 1), 2e-4)
+    kind = kind_of(rows(0.1 * rng.standard_normal((300, COUNT)), rng, calibrated))
     number = kind.parameters.index("alpha_6")
-    one = spreads(kind)[number]
+    parameter = spreads(kind)[number]
     raw = np.std(kind.difference[:, number])
-    assert raw > 1.5 * 0.1 * one.prior
-    assert known(one.low) <= 0.1 * one.prior <= known(one.high)
-    assert one.verdict == "narrower"
+    assert raw > 1.5 * 0.1 * parameter.prior
+    assert known(parameter.low) <= 0.1 * parameter.prior <= known(parameter.high)
+    assert parameter.verdict == "narrower"
 
 
 def test_verdicts_and_what_is_not_told() -> None:
@@ -114,19 +119,19 @@ def test_verdicts_and_what_is_not_told() -> None:
     scale = np.ones(COUNT)
     scale[NAMES.index("a_3")], scale[NAMES.index("alpha_3")] = 3.0, 0.2
     kind = kind_of(rows(rng.standard_normal((60, COUNT)) * scale, rng))
-    told = {one.parameter: one for one in spreads(kind)}
+    by_name = {parameter.parameter: parameter for parameter in spreads(kind)}
     verdicts = {"a_3": "wider", "alpha_3": "narrower", "d_2": "shared", "d_3": "shared", "theta_offset_1": "prior only"}
-    assert {name: told[name].verdict for name in verdicts} == verdicts
-    assert told["theta_offset_1"].proposed is None
+    assert {name: by_name[name].verdict for name in verdicts} == verdicts
+    assert by_name["theta_offset_1"].proposed is None
     few = kind_of(rows(rng.standard_normal((9, COUNT)), rng))
-    assert {one.verdict for one in spreads(few)} == {"too few", "shared", "prior only"}
+    assert {parameter.verdict for parameter in spreads(few)} == {"too few", "shared", "prior only"}
 
 
 def test_a_robot_with_a_fault_does_not_widen_the_priors() -> None:
     rng = np.random.default_rng(4)
     place = NAMES.index("theta_offset_3")
     kind = kind_of(rows(drawn(30, rng, theta_offset_3=12.0), rng))
-    faulty = {one.robot for one in differences(kind)}
+    faulty = {difference.robot for difference in differences(kind)}
     assert faulty == {"robot-2"}
     assert spreads(kind)[place].verdict == "wider"
     assert spreads(kind, faulty)[place].verdict == "agrees"
@@ -136,25 +141,25 @@ def test_proposed_priors_are_a_robot_file_that_can_be_read(tmp_path: Path) -> No
     rng = np.random.default_rng(5)
     truth = drawn(60, rng)
     truth[:, NAMES.index("a_3")] = 2.0 + 0.3 * truth[:, NAMES.index("a_3")]  # all robots are 2 mm longer
-    told = spreads(kind_of(rows(truth, rng)))
+    of_series = spreads(kind_of(rows(truth, rng)))
     nominal = load_robot("irb120")
-    made, proposed = with_proposed(nominal, told)
+    with_priors, proposed = with_proposed(nominal, of_series)
     assert "d_2" not in proposed
-    shifted = made.parameters["a_3"]
+    shifted = with_priors.parameters["a_3"]
     assert shifted.nominal == shifted.value == pytest.approx(nominal.values["a_3"] + 2e-3, abs=2e-4)
     assert shifted.prior == pytest.approx(3e-4, rel=0.3)
-    assert made.parameters["d_4"].nominal == nominal.values["d_4"]
-    (tmp_path / "priors.yaml").write_text(robot_text(made), "utf-8")
+    assert with_priors.parameters["d_4"].nominal == nominal.values["d_4"]
+    (tmp_path / "priors.yaml").write_text(robot_text(with_priors), "utf-8")
     again = read_robot(tmp_path / "priors.yaml")
     assert "a_3" in proposed
     for name in proposed:
-        assert again.parameters[name].prior == pytest.approx(made.parameters[name].prior, rel=1e-12)
+        assert again.parameters[name].prior == pytest.approx(with_priors.parameters[name].prior, rel=1e-12)
     assert "from the spread of 60 robots" in again.source
-    made, proposed = with_proposed(nominal, spreads(kind_of(rows(drawn(5, rng), rng))))
-    assert (bool(proposed), made) == (False, nominal)  # of too few robots
+    with_priors, proposed = with_proposed(nominal, spreads(kind_of(rows(drawn(5, rng), rng))))
+    assert (bool(proposed), with_priors) == (False, nominal)  # of too few robots
     # no prior is proposed where values scatter less than they are uncertain by
-    found = ParameterSpread("a_2", "m", 0.0, 1e-3, 1.0, 12, "narrower", spread=0.0, low=0.0, high=0.0)
-    assert found.proposed is None
+    without_spread = ParameterSpread("a_2", "m", 0.0, 1e-3, 1.0, 12, "narrower", spread=0.0, low=0.0, high=0.0)
+    assert without_spread.proposed is None
 
 
 # -- robots that differ ------------------------------------------------------------------------------------
@@ -181,11 +186,13 @@ def test_a_slipped_zero_is_found_in_its_joint(robots: int) -> None:
 
 def test_a_link_that_only_a_sum_shows_is_told_with_its_partner() -> None:
     rng = np.random.default_rng(4)
-    found = {one.parameter: one for one in differences(kind_of(rows(drawn(20, rng, 0.3, d_3=6.0), rng)))}
-    assert {"d_2", "d_3"} <= set(found)
-    assert not found["d_3"].alone
-    assert found["d_3"].together == ("d_2",)
-    assert found["d_3"].off == pytest.approx(6e-3, abs=1.5e-3)  # of the sum
+    differing = {
+        difference.parameter: difference for difference in differences(kind_of(rows(drawn(20, rng, 0.3, d_3=6.0), rng)))
+    }
+    assert {"d_2", "d_3"} <= set(differing)
+    assert not differing["d_3"].alone
+    assert differing["d_3"].together == ("d_2",)
+    assert differing["d_3"].off == pytest.approx(6e-3, abs=1.5e-3)  # of the sum
     # what only priors hold is not compared: the base turns as well
     assert not differences(kind_of(rows(drawn(20, rng, 0.3, theta_offset_1=30.0), rng)))
 
@@ -202,21 +209,21 @@ def test_a_robot_that_was_measured_badly_is_not_taken_for_another() -> None:
 
 def test_parameters_whose_nominal_values_differ_or_that_few_robots_identified_are_not_compared() -> None:
     rng = np.random.default_rng(7)
-    told = rows(rng.standard_normal((12, COUNT)), rng)
-    one = told[3].parameters["a_3"]
-    others = {**told[3].parameters, "a_3": replace(one, nominal=one.nominal + 0.05)}
-    told[3] = replace(told[3], parameters=FoundParameters.of(others))
-    kind = kind_of(told)
+    measured = rows(rng.standard_normal((12, COUNT)), rng)
+    link = measured[3].parameters["a_3"]
+    others = {**measured[3].parameters, "a_3": replace(link, nominal=link.nominal + 0.05)}
+    measured[3] = replace(measured[3], parameters=FoundParameters.of(others))
+    kind = kind_of(measured)
     assert np.isnan(kind.prior[kind.parameters.index("a_3")])
     assert not [each for each in differences(kind) if each.parameter == "a_3"]
     rng = np.random.default_rng(11)
-    told = rows(rng.standard_normal((20, COUNT)), rng)
+    measured = rows(rng.standard_normal((20, COUNT)), rng)
     for number in range(4, 20):
-        kept = {name: one for name, one in told[number].parameters.items() if name != "a_3"}
-        told[number] = replace(told[number], parameters=FoundParameters.of(kept), covariance=())
-    wrong = {**told[0].parameters, "a_3": replace(told[0].parameters["a_3"], value=9.0)}
-    told[0] = replace(told[0], parameters=FoundParameters.of(wrong))
-    assert not [one for one in differences(kind_of(told)) if one.parameter == "a_3"]
+        remaining = {name: value for name, value in measured[number].parameters.items() if name != "a_3"}
+        measured[number] = replace(measured[number], parameters=FoundParameters.of(remaining), covariance=())
+    wrong = {**measured[0].parameters, "a_3": replace(measured[0].parameters["a_3"], value=9.0)}
+    measured[0] = replace(measured[0], parameters=FoundParameters.of(wrong))
+    assert not [difference for difference in differences(kind_of(measured)) if difference.parameter == "a_3"]
 
 
 # -- machines that were measured again ---------------------------------------------------------------------
@@ -226,27 +233,27 @@ def campaigns(
     truth: Array,
     months: tuple[int, ...],
     rng: np.random.Generator,
-    hows: tuple[Calibrations, ...],
+    calibrated: tuple[Calibrations, ...],
     rate: Array | None = None,
     *,
     correlated: bool = True,
 ) -> Drifts:
     """Measure machines with true differences ``(machines, parameters)`` in some months, with a change a month."""
-    told: list[Row] = []
+    measured: list[Row] = []
     for machine in range(len(truth)):
-        for month, how in zip(months, hows, strict=True):
+        for month, of_month in zip(months, calibrated, strict=True):
             days = date(2026, month + 1, 1).toordinal() - date(2026, months[0] + 1, 1).toordinal()
-            there = truth[machine] + (0.0 if rate is None else rate * days / MONTH)
-            told += rows(
-                there[None],
+            true = truth[machine] + (0.0 if rate is None else rate * days / MONTH)
+            measured += rows(
+                true[None],
                 rng,
-                how,
+                of_month,
                 names=[f"m{machine}-{month}"],
                 of=f"m{machine}",
                 date=f"2026-{month + 1:02d}-01",
                 correlated=correlated,
             )
-    return drifts(kind_of(told))
+    return drifts(kind_of(measured))
 
 
 STRONG, OTHER, POOR = calibrations(campaign()), calibrations(campaign(30, 1)), calibrations(campaign(8, 3), 3e-4)
@@ -258,10 +265,10 @@ def test_few_fleets_without_a_change_tell_one(hows: tuple[Calibrations, ...]) ->
     times: dict[str, list[float]] = {}
     alarms = 0
     for _ in range(25):
-        found = campaigns(rng.standard_normal((4, COUNT)), (0, 6), rng, hows)
-        alarms += bool(found.significant)
-        for one in found.found:
-            times.setdefault(one.parameter, []).append(one.times)
+        changes = campaigns(rng.standard_normal((4, COUNT)), (0, 6), rng, hows)
+        alarms += bool(changes.significant)
+        for change in changes.changes:
+            times.setdefault(change.parameter, []).append(change.times)
     assert alarms <= 4
     assert {"d_2", "d_3"} <= set(times)  # their sum is seen
     for those in times.values():
@@ -273,7 +280,7 @@ def test_without_correlations_nothing_is_told_that_they_would_not_tell() -> None
     rate, truth = changing(d_3=0.2), drawn(1, rng)
     known = campaigns(truth, (0, 6), rng, (STRONG, OTHER), rate)
     blind = campaigns(truth, (0, 6), rng, (STRONG, OTHER), rate, correlated=False)
-    assert {one.parameter for one in known.significant} == {"d_2", "d_3"}
+    assert {change.parameter for change in known.significant} == {"d_2", "d_3"}
     assert known.significant[0].together in (("d_2",), ("d_3",))
     assert not blind.significant
 
@@ -281,13 +288,13 @@ def test_without_correlations_nothing_is_told_that_they_would_not_tell() -> None
 def test_a_drift_is_found_with_its_rate_and_where_it_is() -> None:
     rng = np.random.default_rng(3)
     rate = changing(theta_offset_4=0.2)  # 0.02 deg a month
-    found = campaigns(drawn(1, rng), (0, 3, 6, 11), rng, (STRONG, OTHER, STRONG, OTHER), rate)
-    (one,) = found.significant
-    assert (one.machine, one.parameter, one.campaigns, one.steady) == ("m0", "theta_offset_4", 4, True)
-    assert np.degrees(one.low) < 0.02 < np.degrees(one.high)
-    assert np.degrees(one.change) == pytest.approx(0.02 * 334 / MONTH, abs=0.005)
-    assert one.changes[0] == 0.0
-    assert np.degrees(one.changes[-1]) == pytest.approx(0.02 * 334 / MONTH, abs=0.005)
+    fleet_drifts = campaigns(drawn(1, rng), (0, 3, 6, 11), rng, (STRONG, OTHER, STRONG, OTHER), rate)
+    (drift,) = fleet_drifts.significant
+    assert (drift.machine, drift.parameter, drift.campaigns, drift.steady) == ("m0", "theta_offset_4", 4, True)
+    assert np.degrees(drift.low) < 0.02 < np.degrees(drift.high)
+    assert np.degrees(drift.change) == pytest.approx(0.02 * 334 / MONTH, abs=0.005)
+    assert drift.changes[0] == 0.0
+    assert np.degrees(drift.changes[-1]) == pytest.approx(0.02 * 334 / MONTH, abs=0.005)
 
 
 def test_intervals_of_rates_cover_the_truth_all_together() -> None:
@@ -295,12 +302,12 @@ def test_intervals_of_rates_cover_the_truth_all_together() -> None:
     rate = 0.03 * rng.standard_normal(COUNT)
     off, together = [], []
     for _ in range(20):
-        found = campaigns(rng.standard_normal((3, COUNT)), (0, 4, 9), rng, (STRONG, OTHER, OTHER), rate)
-        alone = [one for one in found.found if one.alone]
-        true = [rate[NAMES.index(one.parameter)] * campaign().prior[NAMES.index(one.parameter)] for one in alone]
-        off += [(one.slope - t) / (one.slope / one.times) for one, t in zip(alone, true, strict=True)]
-        together.append(all(one.low <= t <= one.high for one, t in zip(alone, true, strict=True)))
-        assert all(one.significant == (one.low > 0.0 or one.high < 0.0) for one in found.found)
+        fleet_drifts = campaigns(rng.standard_normal((3, COUNT)), (0, 4, 9), rng, (STRONG, OTHER, OTHER), rate)
+        alone = [drift for drift in fleet_drifts.changes if drift.alone]
+        true = [rate[NAMES.index(drift.parameter)] * campaign().prior[NAMES.index(drift.parameter)] for drift in alone]
+        off += [(drift.slope - t) / (drift.slope / drift.times) for drift, t in zip(alone, true, strict=True)]
+        together.append(all(drift.low <= t <= drift.high for drift, t in zip(alone, true, strict=True)))
+        assert all(drift.significant == (drift.low > 0.0 or drift.high < 0.0) for drift in fleet_drifts.changes)
     assert 0.92 <= np.mean(np.abs(off) < 1.96) <= 0.98
     assert sum(together) >= 17  # 19 are promised; chance gives fewer than 17 in 1 of 60 runs
 
@@ -308,27 +315,27 @@ def test_intervals_of_rates_cover_the_truth_all_together() -> None:
 def test_a_jump_is_a_change_but_not_steady() -> None:
     rng = np.random.default_rng(5)
     truth = rng.standard_normal((1, COUNT))
-    told = []
+    measured = []
     for month, jump in ((0, 0.0), (4, 0.0), (8, 3.0)):
-        there = truth.copy()
-        there[0, NAMES.index("theta_offset_3")] += jump
-        told += rows(there, rng, names=[f"c{month}"], of="m", date=f"2026-{month + 1:02d}-01")
-    (one,) = drifts(kind_of(told)).significant
-    assert one.parameter == "theta_offset_3"
-    assert one.steady is False
+        true = truth.copy()
+        true[0, NAMES.index("theta_offset_3")] += jump
+        measured += rows(true, rng, names=[f"c{month}"], of="m", date=f"2026-{month + 1:02d}-01")
+    (drift,) = drifts(kind_of(measured)).significant
+    assert drift.parameter == "theta_offset_3"
+    assert drift.steady is False
 
 
 def test_what_base_or_target_can_do_instead_is_not_told() -> None:
     rng = np.random.default_rng(6)
-    found = campaigns(drawn(2, rng), (0, 6), rng, (STRONG, OTHER), changing(theta_offset_1=3.0))
-    assert not found.significant
-    assert {"theta_offset_1", "d_1", "theta_offset_6"} <= set(found.unknown)
+    fleet_drifts = campaigns(drawn(2, rng), (0, 6), rng, (STRONG, OTHER), changing(theta_offset_1=3.0))
+    assert not fleet_drifts.significant
+    assert {"theta_offset_1", "d_1", "theta_offset_6"} <= set(fleet_drifts.unknown)
 
 
 def test_a_change_of_all_machines_alike_is_named() -> None:
     rng = np.random.default_rng(17)
-    found = campaigns(drawn(8, rng), (0, 6), rng, (STRONG, OTHER), changing(a_3=0.05))
-    alike = {one.parameter: one for one in found.alike}
+    fleet_drifts = campaigns(drawn(8, rng), (0, 6), rng, (STRONG, OTHER), changing(a_3=0.05))
+    alike = {change.parameter: change for change in fleet_drifts.alike}
     assert alike["a_3"].low < 0.05e-3 < alike["a_3"].high
     assert len(alike) <= 2
 
@@ -336,40 +343,40 @@ def test_a_change_of_all_machines_alike_is_named() -> None:
 def test_machines_without_two_dates_are_named() -> None:
     rng = np.random.default_rng(8)
     truth = rng.standard_normal((1, COUNT))
-    told = rows(truth, rng, names=["a"], of="m") + rows(truth, rng, names=["b"], of="m", date="2026-01-01")
-    found = drifts(kind_of(told))
-    assert found.undated == ("m",)
-    assert not found.found
+    measured = rows(truth, rng, names=["a"], of="m") + rows(truth, rng, names=["b"], of="m", date="2026-01-01")
+    fleet_drifts = drifts(kind_of(measured))
+    assert fleet_drifts.undated == ("m",)
+    assert not fleet_drifts.changes
 
 
 def test_of_many_machines_the_surest_of_each_is_kept() -> None:
     rng = np.random.default_rng(9)
-    found = campaigns(drawn(60, rng), (0, 6), rng, (STRONG, OTHER), changing(a_3=0.5, theta_offset_4=0.5))
-    assert {one.parameter for one in found.significant} == {"a_3", "theta_offset_4"}
-    assert (len(found.significant), len(found.found), found.compared) == (120, 120, 60 * 19)
+    fleet_drifts = campaigns(drawn(60, rng), (0, 6), rng, (STRONG, OTHER), changing(a_3=0.5, theta_offset_4=0.5))
+    assert {drift.parameter for drift in fleet_drifts.significant} == {"a_3", "theta_offset_4"}
+    assert (len(fleet_drifts.significant), len(fleet_drifts.changes), fleet_drifts.compared) == (120, 120, 60 * 19)
 
 
 def test_another_robot_under_the_same_serial_number_is_suspected() -> None:
     rng = np.random.default_rng(10)
     truth = rng.standard_normal((3, COUNT))
     first, later = "2026-01-01", "2026-07-01"
-    told = [
+    measured = [
         *rows(truth[:1], rng, names=["a"], of="m", date=first),
         *rows(truth[1:2], rng, names=["b"], of="m", date=later),
         *rows(truth[2:], rng, names=["c"], of="n", date=first),
         *rows(truth[2:], rng, names=["d"], of="n", date=later),
     ]
-    found = drifts(kind_of(told))
-    assert found.others == ("m",)
-    (notice,) = [each for each in analysis_notices(analysed(told)) if each.code == "another-machine"]
+    fleet_drifts = drifts(kind_of(measured))
+    assert fleet_drifts.others == ("m",)
+    (notice,) = [each for each in analysis_notices(analysed(measured)) if each.code == "another-machine"]
     assert (notice.level, "of m changed" in notice.message) == ("warning", True)
 
 
 # -- all that a fleet says ---------------------------------------------------------------------------------
 
 
-def analysis_lines(found: Analysis) -> list[str]:
-    return lines_of(analysis_blocks(found))
+def analysis_lines(analysis: Analysis) -> list[str]:
+    return lines_of(analysis_blocks(analysis))
 
 
 def series(robots: int, seed: int = 1, error: float = 5e-5) -> list[Row]:
@@ -393,8 +400,8 @@ def test_robots_are_looked_at_in_the_order_of_their_reasons() -> None:
     zero = fleet[11].parameters["theta_offset_3"]
     turned = {**fleet[11].parameters, "theta_offset_3": replace(zero, value=zero.value + np.radians(2.0))}
     fleet[11] = replace(fleet[11], parameters=FoundParameters.of(turned))
-    found = analysed(fleet)
-    why = {look.robot: [reason.why for reason in look.reasons] for look in found.looks}
+    analysis = analysed(fleet)
+    why = {look.robot: [reason.why for reason in look.reasons] for look in analysis.looks}
     assert why == {
         "robot-10": ["failed"],
         "robot-5": ["error"],
@@ -404,8 +411,8 @@ def test_robots_are_looked_at_in_the_order_of_their_reasons() -> None:
         "robot-12": ["differs"],
     }
     assert list(why) == ["robot-10", "robot-5", "robot-7", "robot-9", "robot-3", "robot-12"]
-    assert found.failed == (("robot-10", "there is no reading"),)
-    text = "\n".join(analysis_lines(found))
+    assert analysis.failed == (("robot-10", "there is no reading"),)
+    text = "\n".join(analysis_lines(analysis))
     for words in (
         "not calibrated: there is no reading",
         "should not be used as it is (wrong-robot)",
@@ -430,20 +437,20 @@ def test_a_machine_counts_once_with_its_last_measurement() -> None:
     first, second, other = series(3)
     first = replace(first, of="m", date="2026-05-01", held_out=Accuracy(1.0, 1.0, 1.0, 5))
     second = replace(second, of="m", date="2026-01-01", held_out=Accuracy(2.0, 2.0, 2.0, 5))
-    found = analysed([first, second, other])
-    assert (found.measurements, found.machines) == (3, 2)
-    assert sorted(found.errors["held_out"].mean.tolist())[-1] == 1.0
-    assert [found.kinds[0].kind.names[i] for i in found.kinds[0].kind.latest] == ["robot-1", "robot-3"]
+    analysis = analysed([first, second, other])
+    assert (analysis.measurements, analysis.machines) == (3, 2)
+    assert sorted(analysis.errors["held_out"].mean.tolist())[-1] == 1.0
+    assert [analysis.kinds[0].kind.names[i] for i in analysis.kinds[0].kind.latest] == ["robot-1", "robot-3"]
     wrong = replace(first, errors=("wrong-units",))  # of a machine the last campaign without an error counts
     assert analysed([wrong, second]).errors["held_out"].mean.tolist() == [2.0]
 
 
 def test_kinds_of_robots_are_compared_among_themselves() -> None:
     fleet = series(12) + [replace(row, name=f"{row.name}-b", robot="other") for row in series(4, 2)]
-    found = analysed(fleet)
-    assert [(kind.kind.robot, len(kind.kind.names)) for kind in found.kinds] == [("irb120", 12), ("other", 4)]
+    analysis = analysed(fleet)
+    assert [(kind.kind.robot, len(kind.kind.names)) for kind in analysis.kinds] == [("irb120", 12), ("other", 4)]
     begin = "other: Parameters of 4 robots compared with their priors"
-    assert any(line.startswith(begin) for line in analysis_lines(found))
+    assert any(line.startswith(begin) for line in analysis_lines(analysis))
 
 
 def test_notices_say_what_figures_do_not() -> None:
@@ -471,23 +478,23 @@ def test_notices_say_what_figures_do_not() -> None:
 
 
 def test_json_holds_figures_in_mm_and_deg() -> None:
-    said = held_by(analysis_blocks(analysed(series(12))))
-    (kind,) = said["kinds"]
-    told = {row["name"]: row for row in kind["parameters"]}
-    assert told["a_3"]["unit"] == "mm"
-    assert told["a_3"]["prior"] == pytest.approx(1.0)
-    assert 0.3 < told["a_3"]["spread"] < 3.0
-    assert told["theta_offset_3"]["prior"] == pytest.approx(0.1)
-    assert told["d_2"]["spread"] is None
-    assert said["errors_mm"]["held_out"]["of_means"][0]["value"] == pytest.approx(0.05, rel=0.2)
-    assert said["errors_mm"]["held_out"]["of_means"][3]["value"] is None
+    content = json_of(analysis_blocks(analysed(series(12))))
+    (kind,) = content["kinds"]
+    parameters = {row["name"]: row for row in kind["parameters"]}
+    assert parameters["a_3"]["unit"] == "mm"
+    assert parameters["a_3"]["prior"] == pytest.approx(1.0)
+    assert 0.3 < parameters["a_3"]["spread"] < 3.0
+    assert parameters["theta_offset_3"]["prior"] == pytest.approx(0.1)
+    assert parameters["d_2"]["spread"] is None
+    assert content["errors_mm"]["held_out"]["of_means"][0]["value"] == pytest.approx(0.05, rel=0.2)
+    assert content["errors_mm"]["held_out"]["of_means"][3]["value"] is None
 
 
 def test_a_fleet_without_any_result_and_a_series_beside_nominal_say_so() -> None:
-    found = analysed([Row("a", "failed", "no"), Row("b", "failed", "no")])
-    assert not found.kinds
-    assert not found.errors
-    assert analysis_lines(found)[0].startswith("Not calibrated: 2 of 2; of such a series 15.8 to 100 %")
+    analysis = analysed([Row("a", "failed", "no"), Row("b", "failed", "no")])
+    assert not analysis.kinds
+    assert not analysis.errors
+    assert analysis_lines(analysis)[0].startswith("Not calibrated: 2 of 2; of such a series 15.8 to 100 %")
     rng = np.random.default_rng(6)
     truth = drawn(20, rng, 0.3)
     truth[:, NAMES.index("d_4")] += 2.0
@@ -498,7 +505,10 @@ def test_a_fleet_without_any_result_and_a_series_beside_nominal_say_so() -> None
 def test_results_that_end_with_an_error_are_in_no_figure() -> None:
     fleet = series(12)
     whole = analysed([row for number, row in enumerate(fleet) if number != 4])
-    wrong = {name: replace(one, value=one.value + 50.0 * one.prior) for name, one in fleet[4].parameters.items()}
+    wrong = {
+        name: replace(parameter, value=parameter.value + 50.0 * parameter.prior)
+        for name, parameter in fleet[4].parameters.items()
+    }
     fleet[4] = replace(
         fleet[4],
         errors=("wrong-units",),
@@ -506,17 +516,17 @@ def test_results_that_end_with_an_error_are_in_no_figure() -> None:
         held_out=Accuracy(1.0, 1.0, 2.0, 20),
         nominal=Accuracy(2.0, 2.0, 3.0, 20),
     )
-    found = analysed(fleet)
-    assert (found.left_out, found.measurements, whole.left_out) == (("robot-5",), 12, ())
+    analysis = analysed(fleet)
+    assert (analysis.left_out, analysis.measurements, whole.left_out) == (("robot-5",), 12, ())
     for name, errors in whole.errors.items():
-        assert found.errors[name].mean.tolist() == errors.mean.tolist()
-    assert found.kinds[0].spreads == whole.kinds[0].spreads
-    assert found.kinds[0].differences == whole.kinds[0].differences
-    first = found.looks[0]
+        assert analysis.errors[name].mean.tolist() == errors.mean.tolist()
+    assert analysis.kinds[0].spreads == whole.kinds[0].spreads
+    assert analysis.kinds[0].differences == whole.kinds[0].differences
+    first = analysis.looks[0]
     assert (first.robot, [reason.why for reason in first.reasons]) == ("robot-5", ["error"])
-    said = "Left out of all figures, because their results end with an error: 1 robot (robot-5)."
-    assert said in analysis_lines(found)
-    assert held_by(analysis_blocks(found))["left_out"] == ["robot-5"]
+    line = "Left out of all figures, because their results end with an error: 1 robot (robot-5)."
+    assert line in analysis_lines(analysis)
+    assert json_of(analysis_blocks(analysis))["left_out"] == ["robot-5"]
 
 
 # -- pictures: of few robots every value, of many no more than a picture needs -------------------------------------
@@ -588,11 +598,11 @@ def test_changes_are_drawn_in_their_unit() -> None:
     truth = rng.standard_normal((1, COUNT))
     later = truth.copy()
     later[0, NAMES.index("theta_offset_4")] += 2.0
-    told = [
+    measured = [
         *rows(truth, rng, names=["a"], of="<m>", date="2026-01-01"),
         *rows(later, rng, names=["b"], of="<m>", date="2026-07-01"),
     ]
-    figures = fleet_figures(analysed(told))
+    figures = fleet_figures(analysed(measured))
     marks, line = figures["drift-angles"]["data"]
     legend = figures["drift-angles"]["layout"]["legend"]
     assert (legend["yref"], legend["y"]) == ("container", 0)  # the toolbar is at the top

@@ -33,21 +33,21 @@ chunk: 2
 
 
 def test_addresses_of_schedulers() -> None:
-    for came, full in (
+    for address, full in (
         ("127.0.0.1:8786", "tcp://127.0.0.1:8786"),
         ("tcp://localhost:8786", "tcp://localhost:8786"),
         ("tcp://[::1]:8786", "tcp://[::1]:8786"),
         ("tls://cell.example:8786", "tls://cell.example:8786"),
     ):
-        assert checked_address(came, insecure=False) == full
+        assert checked_address(address, insecure=False) == full
     none = ("", "8786", "localhost", "http://localhost:1", "tcp://:8786", "tcp://[::1:8786", "a:b", "tcp:// :1")
     secret = ("tcp://me:secret@10.0.0.1:8786", "me:secret@localhost:1", "tls://secret@h:1", "secret@")
-    for came in (*none, "tcp://a b:1", *secret):  # a password is not told
-        told = refused("scheduler", "no address of a scheduler", checked_address, came, insecure=True)
-        assert "secret" not in told
-    for came in ("tcp://cell.example:8786", "10.0.0.1:8786", "localhost.example:1"):
-        refused(None, "reached without TLS.*`insecure`", checked_address, came, insecure=False)
-        assert checked_address(came, insecure=True).endswith(came)
+    for address in (*none, "tcp://a b:1", *secret):  # a password is not told
+        message = refused("scheduler", "no address of a scheduler", checked_address, address, insecure=True)
+        assert "secret" not in message
+    for address in ("tcp://cell.example:8786", "10.0.0.1:8786", "localhost.example:1"):
+        refused(None, "reached without TLS.*`insecure`", checked_address, address, insecure=False)
+        assert checked_address(address, insecure=True).endswith(address)
 
 
 def series(folder: Path) -> Path:
@@ -57,9 +57,9 @@ def series(folder: Path) -> Path:
 
 
 def free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
+    with socket.socket() as opened:
+        opened.bind(("127.0.0.1", 0))
+        return int(opened.getsockname()[1])
 
 
 def test_where_nobody_listens_the_run_is_refused_and_nothing_written(tmp_path: Path) -> None:
@@ -112,19 +112,19 @@ def test_odd_greetings_are_refused_in_seconds_and_in_one_line(
     monkeypatch.setattr(cluster, "_MARGIN", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as odd:
         address = f"127.0.0.1:{odd.getsockname()[1]}"
-        kept = []
+        connections = []
 
         def speak() -> None:
             with contextlib.suppress(OSError):
                 while True:
-                    kept.append(odd.accept()[0])
-                    kept[-1].sendall(words)
+                    connections.append(odd.accept()[0])
+                    connections[-1].sendall(words)
 
         threading.Thread(target=speak, daemon=True).start()
         with pytest.raises(InputError, match="no Dask scheduler answers there") as caught:
             Cluster(address, insecure=False)
-    for one in kept:
-        one.close()
+    for connection in connections:
+        connection.close()
     assert caught.value.came == f"tcp://{address}"
     assert capfd.readouterr().err == ""
 
@@ -172,8 +172,8 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, sub
     worker = None
     try:
         for _ in range(200):
-            with socket.socket() as one:
-                if one.connect_ex(("127.0.0.1", port)) == 0:
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", port)) == 0:
                     break
             time.sleep(0.1)
         worker = started(
@@ -197,11 +197,11 @@ def scheduler(running: tuple[str, subprocess.Popen[bytes]], monkeypatch: pytest.
 
 def test_a_cluster_finds_what_this_process_finds(scheduler: str, tmp_path: Path) -> None:
     file = series(tmp_path)
-    here = truearm.fleet(file, out=tmp_path / "here", workers=1)
-    there = truearm.fleet(file, out=tmp_path / "there", scheduler=scheduler)
-    assert there.content() == here.content()
+    local = truearm.fleet(file, out=tmp_path / "here", workers=1)
+    remote = truearm.fleet(file, out=tmp_path / "there", scheduler=scheduler)
+    assert remote.content() == local.content()
     assert (tmp_path / "there" / "robots.csv").read_bytes() == (tmp_path / "here" / "robots.csv").read_bytes()
-    rows = [[*one.recorded.rows()] for one in (here, there)]
+    rows = [[*fleet.recorded.rows()] for fleet in (local, remote)]
     assert [row.parameters for row in rows[0]] == [row.parameters for row in rows[1]]
     assert json.loads((tmp_path / "there" / "fleet.json").read_text())["calibrated"] == 5
 
@@ -239,8 +239,8 @@ def test_a_scheduler_that_is_killed_is_told_once_and_without_tracebacks(
     def work() -> None:
         with with_workers(Cluster(scheduler, insecure=False)) as workers:
             monkeypatch.setattr(cluster, "PATIENCE", 1.0)
-            for done in done_parts(abs, range(10**6), workers):
-                assert done.result == done.part
+            for finished in done_parts(abs, range(10**6), workers):
+                assert finished.result == finished.part
                 running[1].terminate()
 
     with pytest.raises(InputError, match="the scheduler is gone") as caught:

@@ -43,20 +43,24 @@ def test_a_table_gives_every_robot_its_options(folder: Path) -> None:
         "# measured again\ntwo,arm.yaml,b.csv,4711,2026-09-01,elastic,all,backlash;clearance\n",
         "{model: geometric, seed: 3, bounds: bounds.yaml}",
     )
-    one, two = read_manifest(path).robots
-    assert (one.robot, one.data, one.of, one.date) == ("ur5", folder / "a.csv", "4711", "2026-03-01")
-    assert one.options == {"model": "geometric", "seed": 3, "train": 40, "bounds": str(folder / "bounds.yaml")}
-    assert (two.robot, two.options["model"], two.options["train"]) == (str(folder / "arm.yaml"), "elastic", "all")
-    assert two.options["effects"] == ["backlash", "clearance"]
+    first, second = read_manifest(path).robots
+    assert (first.robot, first.data, first.of, first.date) == ("ur5", folder / "a.csv", "4711", "2026-03-01")
+    assert first.options == {"model": "geometric", "seed": 3, "train": 40, "bounds": str(folder / "bounds.yaml")}
+    assert (second.robot, second.options["model"], second.options["train"]) == (
+        str(folder / "arm.yaml"),
+        "elastic",
+        "all",
+    )
+    assert second.options["effects"] == ["backlash", "clearance"]
     assert {"a.csv", "b.csv", "arm.yaml", "robots.csv", "bounds.yaml"} <= set(read_manifest(path).hashes)
 
 
 def test_a_list_gives_the_same(folder: Path) -> None:
-    said = [
+    entries = [
         {"name": "one", "robot": "ur5", "data": "a.csv", "of": 4711, "date": "2026-03-01", "options": {"train": 40}},
     ]
-    (one,) = robots_of(said, {"seed": 2}, folder / "fleet.yaml").entries
-    assert (one.of, one.date, one.options) == ("4711", "2026-03-01", {"seed": 2, "train": 40})
+    (entry,) = robots_of(entries, {"seed": 2}, folder / "fleet.yaml").entries
+    assert (entry.of, entry.date, entry.options) == ("4711", "2026-03-01", {"seed": 2, "train": 40})
 
 
 ROW = "one,ur5,a.csv,,,,,\n"
@@ -83,9 +87,9 @@ REFUSED = {
 
 
 def test_a_table_that_cannot_be_used_is_refused_where_it_is_wrong(folder: Path) -> None:
-    for case, (text, where, words) in REFUSED.items():
-        told = refused(None, "", read_manifest, table(folder, text))
-        assert (where in told, words in told) == (True, True), (case, told)
+    for case, (text, place, words) in REFUSED.items():
+        message = refused(None, "", read_manifest, table(folder, text))
+        assert (place in message, words in message) == (True, True), (case, message)
     wrong = table(folder, HEADER + ROW, "{loss: square}")
     refused(None, r"fleet.yaml, options.loss: there is nothing of this name", read_manifest, wrong)
 
@@ -101,10 +105,10 @@ LISTED: dict[str, tuple[dict[str, Any], str, str]] = {
 
 
 def test_an_entry_that_cannot_be_used_is_refused_by_its_place(folder: Path) -> None:
-    for case, (changed, where, words) in LISTED.items():
-        said = [{"name": "one", "robot": "ur5", "data": "a.csv", **changed}]
-        told = refused(None, "", robots_of, said, {}, folder / "fleet.yaml")
-        assert (where in told, words in told) == (True, True), (case, told)
+    for case, (changed, place, words) in LISTED.items():
+        entries = [{"name": "one", "robot": "ur5", "data": "a.csv", **changed}]
+        message = refused(None, "", robots_of, entries, {}, folder / "fleet.yaml")
+        assert (place in message, words in message) == (True, True), (case, message)
     refused(None, "no such file", robots_of, "fleet.csv", {}, folder / "fleet.yaml")
     refused(None, "there are no robots", robots_of, [], {}, folder / "fleet.yaml")
 
@@ -122,8 +126,8 @@ def test_the_same_readings_are_neither_two_robots_nor_two_campaigns(folder: Path
 def test_numbers_that_yaml_would_write_otherwise_belong_in_quotes(folder: Path) -> None:
     for entry, written in product(("of", "name"), ("0123", "1_000", "0x7b", "+12")):
         robot = {"name": "one", "robot": "ur5", "data": "a.csv", entry: written}
-        said = ", ".join(f"{name}: {text}" for name, text in robot.items())
-        (folder / "fleet.yaml").write_text(f"truearm: truearm-fleet/1\nrobots:\n  - {{{said}}}\n", "utf-8")
+        entry_text = ", ".join(f"{name}: {text}" for name, text in robot.items())
+        (folder / "fleet.yaml").write_text(f"truearm: truearm-fleet/1\nrobots:\n  - {{{entry_text}}}\n", "utf-8")
         words = rf"robots\[1\].{entry}: without quotes this is a number"
         assert written in refused(None, words, read_manifest, folder / "fleet.yaml")
     (folder / "fleet.yaml").write_text(
@@ -131,7 +135,10 @@ def test_numbers_that_yaml_would_write_otherwise_belong_in_quotes(folder: Path) 
         "  - {name: 7, robot: ur5, data: a.csv, of: '0123'}\n  - {name: '08', robot: ur5, data: b.csv, of: 123}\n",
         "utf-8",
     )
-    assert [(one.name, one.of) for one in read_manifest(folder / "fleet.yaml").robots] == [("7", "0123"), ("08", "123")]
+    assert [(read.name, read.of) for read in read_manifest(folder / "fleet.yaml").robots] == [
+        ("7", "0123"),
+        ("08", "123"),
+    ]
 
 
 def test_a_robot_is_computed_anew_where_its_own_entry_or_file_changes(folder: Path) -> None:

@@ -36,8 +36,8 @@ def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
     moved = [",".join([*row[:3], f"{float(row[3]) + 0.1:.6f}", *row[4:]]) for row in rows]
     empty = [",".join([*row[:8], "", "", "", "0.03"]) for row in rows[:3]]
     metres = [lines[0].replace("[mm]", "[m]"), *lines[1:]]
-    for name, made in (("again", [lines[0], *moved]), ("empty", [lines[0], *empty]), ("metres", metres)):
-        (folder / f"{name}.csv").write_text("\n".join(made) + "\n", "utf-8")
+    for name, content in (("again", [lines[0], *moved]), ("empty", [lines[0], *empty]), ("metres", metres)):
+        (folder / f"{name}.csv").write_text("\n".join(content) + "\n", "utf-8")
     (folder / "robots.csv").write_text(
         "name,robot,data,of,date,seed\n"
         "one,irb120,a.csv,4711,2026-01-10,\n"
@@ -51,27 +51,27 @@ def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_fleet_calibrates_every_robot_and_says_what_they_say_together(campaigns: Path, tmp_path: Path) -> None:
-    found = truearm.fleet(campaigns / "fleet.yaml", out=tmp_path / "out", workers=1)
+    fleet = truearm.fleet(campaigns / "fleet.yaml", out=tmp_path / "out", workers=1)
     out = tmp_path / "out"
     for name in ("one", "two", "one-again"):
         assert {*RESULT_FILES} <= {path.name for path in (out / "robots" / name).iterdir()}
     assert not (out / "robots" / "broken").exists()
-    one = json.loads((out / "robots" / "one" / "result.json").read_text("utf-8"))
+    result = json.loads((out / "robots" / "one" / "result.json").read_text("utf-8"))
     alone = truearm.calibrate("irb120", campaigns / "a.csv", train=15)
-    told = {row["name"]: row for row in one["parameters"]}
-    assert told["a_3"]["value"] == pytest.approx(alone.robot.values["a_3"] * 1e3, abs=1e-9)
-    assert one["notes"] == {"date": "2026-01-10", "serial": "4711"}
+    parameters = {row["name"]: row for row in result["parameters"]}
+    assert parameters["a_3"]["value"] == pytest.approx(alone.robot.values["a_3"] * 1e3, abs=1e-9)
+    assert result["notes"] == {"date": "2026-01-10", "serial": "4711"}
     second = (out / "robots" / "two" / "result.json").read_text("utf-8")
     assert "seed 5" in json.loads(second)["history"]
 
-    said = json.loads((out / "fleet.json").read_text("utf-8"))
-    assert (said["measurements"], said["machines"], said["calibrated"]) == (4, 3, 3)
-    assert [each["name"] for each in said["failed"]] == ["broken"]
-    (kind,) = said["kinds"]
+    summary = json.loads((out / "fleet.json").read_text("utf-8"))
+    assert (summary["measurements"], summary["machines"], summary["calibrated"]) == (4, 3, 3)
+    assert [each["name"] for each in summary["failed"]] == ["broken"]
+    (kind,) = summary["kinds"]
     changed = [row["parameter"] for row in kind["drift"] if row["significant"]]
     assert changed[0] == "theta_offset_3"
-    assert {"robots-failed", "robots-drift"} <= {notice.code for notice in found.warnings}
-    assert found.analysis.looks[0].robot == "broken"
+    assert {"robots-failed", "robots-drift"} <= {notice.code for notice in fleet.warnings}
+    assert fleet.analysis.looks[0].robot == "broken"
     with (out / "robots.csv").open(encoding="utf-8") as stream:
         table = {row["name"]: row for row in csv.DictReader(stream)}
     assert table["broken"]["look"] == "failed"
@@ -93,23 +93,23 @@ def test_one_robot_of_a_fleet_may_have_excluded_readings_and_its_result_says_why
     manifest = {"truearm": "truearm-fleet/1", "robots": robots, "options": {"model": "offsets"}}
     (tmp_path / "fleet.yaml").write_text(json.dumps(manifest), "utf-8")
     truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
-    one, two = (
+    first, second = (
         json.loads((tmp_path / "out" / "robots" / name / "result.json").read_text("utf-8")) for name in ("one", "two")
     )
-    assert [(row["configuration"], row["target"], row["reason"]) for row in one["excluded"]] == [
+    assert [(row["configuration"], row["target"], row["reason"]) for row in first["excluded"]] == [
         ("3", "1", "nest was dirty")
     ]
-    assert "excluded" not in two
+    assert "excluded" not in second
 
 
 def test_a_robot_whose_result_ends_with_an_error_is_named(campaigns: Path, tmp_path: Path) -> None:
     entry = f"{{name: one, robot: irb120, data: {campaigns / 'metres.csv'}}}"
     (tmp_path / "fleet.yaml").write_text(f"truearm: truearm-fleet/1\nrobots: [{entry}]\n", "utf-8")
-    found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
-    told = {notice.code: notice.message for notice in found.warnings}
-    assert told["robots-in-error"].startswith("The result of 1 robot (one) should not be used")
-    assert "no-result" in told
-    assert found.lines()[1] == "1 robot: 0 usable, 1 whose result ends with an error, 0 not calibrated."
+    fleet = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
+    messages = {notice.code: notice.message for notice in fleet.warnings}
+    assert messages["robots-in-error"].startswith("The result of 1 robot (one) should not be used")
+    assert "no-result" in messages
+    assert fleet.lines()[1] == "1 robot: 0 usable, 1 whose result ends with an error, 0 not calibrated."
 
 
 def test_what_cannot_be_used_is_told_first_and_figures_say_of_how_many_they_are(
@@ -120,11 +120,11 @@ def test_what_cannot_be_used_is_told_first_and_figures_say_of_how_many_they_are(
         for name, file in (("wrong", "metres"), ("right", "b"), ("empty", "empty"))
     ]
     (tmp_path / "fleet.yaml").write_text(json.dumps({"truearm": "truearm-fleet/1", "robots": robots}), "utf-8")
-    found = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
-    said = "3 robots: 1 usable, 1 whose result ends with an error, 1 not calibrated."
+    fleet = truearm.fleet(tmp_path / "fleet.yaml", out=tmp_path / "out", workers=1)
+    line_of_counts = "3 robots: 1 usable, 1 whose result ends with an error, 1 not calibrated."
     heads = [f"{robots} robots, mean error of 1 robot" for robots in ("Nominal", "Calibrated")]
-    assert [found.lines()[1], *(line.partition(":")[0] for line in found.lines()[2:4])] == [said, *heads]
-    assert said.replace(": ", ", ", 1) in (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert [fleet.lines()[1], *(line.partition(":")[0] for line in fleet.lines()[2:4])] == [line_of_counts, *heads]
+    assert line_of_counts.replace(": ", ", ", 1) in (tmp_path / "out" / "report.html").read_text("utf-8")
 
 
 def test_a_row_holds_the_arm_alone_with_its_covariance(campaigns: Path) -> None:
@@ -156,9 +156,11 @@ def test_a_robot_whose_figures_are_not_finite_is_a_row(
     campaigns: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     row = fleet_robots._row
-    monkeypatch.setattr(fleet_robots, "_row", lambda *given: replace(row(*given), held_out=Accuracy(math.nan, 1, 1, 3)))
-    done = calibrated_robot(RobotEntry("one", "irb120", campaigns / "a.csv", {"train": 15}), tmp_path)
-    assert (done.row.status, done.written, "not finite" in done.row.message) == ("failed", (), True)
+    monkeypatch.setattr(
+        fleet_robots, "_row", lambda *arguments: replace(row(*arguments), held_out=Accuracy(math.nan, 1, 1, 3))
+    )
+    calibrated = calibrated_robot(RobotEntry("one", "irb120", campaigns / "a.csv", {"train": 15}), tmp_path)
+    assert (calibrated.row.status, calibrated.written, "not finite" in calibrated.row.message) == ("failed", (), True)
 
 
 def test_a_folder_that_cannot_be_written_is_no_fault_of_the_robot(campaigns: Path, tmp_path: Path) -> None:
@@ -207,8 +209,8 @@ def new(measured: Path, tmp_path: Path) -> Path:
     return folder
 
 
-def run(path: Path, **given: Any) -> Fleet:
-    return truearm.fleet(path, out=path.parent / "out", workers=1, **given)
+def run(path: Path, **options: Any) -> Fleet:
+    return truearm.fleet(path, out=path.parent / "out", workers=1, **options)
 
 
 def refused(path: Path) -> InputError:
@@ -237,14 +239,14 @@ def test_an_option_that_no_robot_can_be_calibrated_with_is_refused_where_it_stan
     folder = new(measured, tmp_path)
     for wrong, words in WRONG:
         option = next(iter(wrong))
-        told = refused(manifest(folder, ROBOTS[:1], wrong))
-        assert (told.parameter, told.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{option}")
-        assert words in str(told)
+        refusal = refused(manifest(folder, ROBOTS[:1], wrong))
+        assert (refusal.parameter, refusal.where) == ("manifest", f"{folder / 'fleet.yaml'}, options.{option}")
+        assert words in str(refusal)
         assert not (folder / "out").exists()
-        told = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "options": wrong}]))
-        assert told.where == f"{folder / 'fleet.yaml'}, robots[2].options.{option}"
-    told = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "robot": "nix"}]))
-    assert ("robots[2].robot" in str(told), "no such robot" in str(told)) == (True, True)
+        refusal = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "options": wrong}]))
+        assert refusal.where == f"{folder / 'fleet.yaml'}, robots[2].options.{option}"
+    refusal = refused(manifest(folder, [ROBOTS[0], {**ROBOTS[1], "robot": "nix"}]))
+    assert ("robots[2].robot" in str(refusal), "no such robot" in str(refusal)) == (True, True)
 
 
 def test_an_option_that_one_robot_of_several_cannot_be_calibrated_with_is_its_own_failure(
@@ -252,9 +254,9 @@ def test_an_option_that_one_robot_of_several_cannot_be_calibrated_with_is_its_ow
 ) -> None:
     folder = new(measured, tmp_path)
     few = {"name": "few", "robot": "irb120", "data": "few.csv"}
-    found = run(manifest(folder, [few, ROBOTS[0]], {"train": 15}))
-    assert [name for name, _ in found.analysis.failed] == ["few"]
-    assert [notice.level for notice in found.warnings if notice.code == "robots-failed"] == ["warning"]
+    fleet = run(manifest(folder, [few, ROBOTS[0]], {"train": 15}))
+    assert [name for name, _ in fleet.analysis.failed] == ["few"]
+    assert [notice.level for notice in fleet.warnings if notice.code == "robots-failed"] == ["warning"]
 
 
 def test_a_fleet_of_which_all_robots_failed_ends_with_an_error(
@@ -278,11 +280,11 @@ def test_a_corrected_manifest_goes_on_with_what_it_has_not_changed(measured: Pat
     three = {"name": "three", "robot": "irb120", "data": "3.csv"}
     corrected = [ROBOTS[0], {**ROBOTS[1], "options": {"train": 14}}, three]
     path = manifest(folder, corrected)
-    found = run(path)
-    assert (found.run.parts, found.run.before) == (3, 1)
-    assert found.run.told == ("1 part computed again, because the manifest or files of it have changed: two",)
+    fleet = run(path)
+    assert (fleet.run.parts, fleet.run.before) == (3, 1)
+    assert fleet.run.told == ("1 part computed again, because the manifest or files of it have changed: two",)
     assert (folder / "out" / "parts" / "0000" / "0000001.jsonl").read_bytes() == first
-    assert found.content() == truearm.fleet(path, out=folder / "whole", workers=1).content()
+    assert fleet.content() == truearm.fleet(path, out=folder / "whole", workers=1).content()
     assert run(path).run.before == 3
 
 
@@ -291,15 +293,15 @@ def test_corrected_data_are_computed_again_and_another_fleet_does_not_go_on_ther
 ) -> None:
     folder = own(measured, tmp_path)
     for robots, chunk in ((ROBOTS[::-1], 1), (ROBOTS, 2), (ROBOTS[:1], 1)):
-        told = refused(manifest(folder, robots, chunk=chunk))
-        assert "the parts there are of another manifest" in str(told)
+        refusal = refused(manifest(folder, robots, chunk=chunk))
+        assert "the parts there are of another manifest" in str(refusal)
         assert (folder / "out" / "robots" / "two").exists()
     robot = "out/robots/one/calibrated.yaml"  # a file that the fleet writes
-    told = refused(manifest(folder, [*ROBOTS, {"name": "again", "robot": robot, "data": "3.csv"}]))
-    assert "stands where the fleet writes" in str(told)
+    refusal = refused(manifest(folder, [*ROBOTS, {"name": "again", "robot": robot, "data": "3.csv"}]))
+    assert "stands where the fleet writes" in str(refusal)
     shutil.copy(folder / "3.csv", folder / "2.csv")
-    found = run(manifest(folder, ROBOTS))
-    assert found.run.told == ("1 part computed again, because the manifest or files of it have changed: two",)
+    fleet = run(manifest(folder, ROBOTS))
+    assert fleet.run.told == ("1 part computed again, because the manifest or files of it have changed: two",)
 
 
 def test_a_folder_that_is_missing_is_made_again(measured: Path, tmp_path: Path) -> None:
@@ -307,10 +309,10 @@ def test_a_folder_that_is_missing_is_made_again(measured: Path, tmp_path: Path) 
     before = (folder / "out" / "robots" / "two" / "calibrated.yaml").read_bytes()
     shutil.rmtree(folder / "out" / "robots" / "two")
     (folder / "out" / "robots" / "one" / "report.html").unlink()
-    found = run(manifest(folder, ROBOTS))
+    fleet = run(manifest(folder, ROBOTS))
     every = ", ".join(f"robots/two/{name}" for name in ("calibrated.yaml", "result.json", "report.html"))
-    told = "1 part computed again, because files of it are missing: "
-    assert found.run.told == (f"{told}robots/one/report.html", f"{told}{every}, robots/two/calibrated.urdf")
+    message = "1 part computed again, because files of it are missing: "
+    assert fleet.run.told == (f"{message}robots/one/report.html", f"{message}{every}, robots/two/calibrated.urdf")
     assert (folder / "out" / "robots" / "two" / "calibrated.yaml").read_bytes() == before
 
 
@@ -324,8 +326,8 @@ def test_data_that_change_while_the_fleet_runs_are_not_taken_for_the_old_ones(me
             shutil.copy(folder / "3.csv", folder / "2.csv")
 
     assert [*read_manifest(path).robots[0].hashes] == [folder / "1.csv"]  # each knows the files read for it
-    found = run(path, progress=disturb)
-    assert found.analysis.failed == (("two", "2.csv changed while the fleet ran; start it again"),)
+    fleet = run(path, progress=disturb)
+    assert fleet.analysis.failed == (("two", "2.csv changed while the fleet ran; start it again"),)
     assert not (folder / "out" / "robots" / "two").exists()
     (folder / "2.csv").write_bytes(old)
     again = run(path)
@@ -352,8 +354,8 @@ def test_a_result_from_before_of_a_robot_that_fails_now_is_told(measured: Path, 
     empty = [",".join([*line.split(",")[:8], "", "", "", "0.03"]) for line in lines[1:4]]
     (folder / "2.csv").write_text("\n".join([lines[0], *empty]) + "\n", "utf-8")
     robots = [ROBOTS[0], {**ROBOTS[1], "options": {}}]
-    found = run(manifest(folder, robots))
-    assert [(one.level, one.message[:29]) for one in found.warnings if one.code == "robots-outdated"] == [
+    fleet = run(manifest(folder, robots))
+    assert [(notice.level, notice.message[:29]) for notice in fleet.warnings if notice.code == "robots-outdated"] == [
         ("warning", "two could not be calibrated, ")
     ]
 
@@ -364,8 +366,8 @@ def test_files_of_others_in_the_folder_of_a_robot_are_found_first(name: str, mea
     shutil.rmtree(folder / "out")
     (folder / "out" / "robots" / "two").mkdir(parents=True)
     (folder / "out" / "robots" / "two" / name).write_text("mine", "utf-8")
-    told = refused(manifest(folder, ROBOTS))
-    assert told.where == str(folder / "out" / "robots" / "two" / name)
+    refusal = refused(manifest(folder, ROBOTS))
+    assert refusal.where == str(folder / "out" / "robots" / "two" / name)
     assert not (folder / "out" / "record.json").exists()
 
 
@@ -376,8 +378,8 @@ def test_links_out_of_the_folder_are_refused(link: str, measured: Path, tmp_path
     (folder / "elsewhere").mkdir()
     (folder / "out" / link).parent.mkdir(parents=True)
     (folder / "out" / link).symlink_to(folder / "elsewhere")
-    told = refused(manifest(folder, ROBOTS))
-    assert ("this is a link" in str(told), told.where) == (True, str(folder / "out" / link))
+    refusal = refused(manifest(folder, ROBOTS))
+    assert ("this is a link" in str(refusal), refusal.where) == (True, str(folder / "out" / link))
     assert [*(folder / "elsewhere").iterdir()] == []
 
 

@@ -62,10 +62,10 @@ def test_trials_together_are_calibrations_of_their_datasets() -> None:
     q = robot.random_configurations(20, np.random.default_rng(1))
     for trial in range(5):
         fit = identify(load_robot("irb120"), together.dataset(trial), BY_NAME["geometric"])
-        found = robot.with_values(dict(zip(names, together.estimate[trial], strict=True)))
+        estimated = robot.with_values(dict(zip(names, together.estimate[trial], strict=True)))
         for target in robot.targets:
             np.testing.assert_allclose(
-                found.world_poses(q, target.name)[0], fit.robot.world_poses(q, target.name)[0], rtol=0, atol=1e-9
+                estimated.world_poses(q, target.name)[0], fit.robot.world_poses(q, target.name)[0], rtol=0, atol=1e-9
             )
         for i, name in enumerate(names):
             alone = fit.robot.parameters[name]
@@ -85,8 +85,8 @@ def test_readings_and_position_errors_are_those_of_the_twin() -> None:
         seen = trials.dataset(trial).position.reshape(3, 50, 3)
         noise = seen - np.moveaxis(measure(twin, q, 0.0, rng).position.reshape(50, 3, 3), 1, 0)
         assert np.sqrt(np.mean(noise**2)) == pytest.approx(SIGMA, rel=0.1)
-        found = robot.with_values(dict(zip(names, trials.estimate[trial], strict=True)))
-        norms = errors_of(found, measure(twin, held_out, 0.0, rng)).position_norms
+        estimated = robot.with_values(dict(zip(names, trials.estimate[trial], strict=True)))
+        norms = errors_of(estimated, measure(twin, held_out, 0.0, rng)).position_norms
         np.testing.assert_allclose(trials.position_error[trial], norms.reshape(20, 3).T, rtol=0, atol=1e-12)
 
 

@@ -45,10 +45,10 @@ def manifest(folder: Path, chunk: int = 2, name: str = "fleet.yaml", **entries: 
     return folder / name
 
 
-def refused(file: Path, out: Path, **how: Any) -> InputError:
+def refused(file: Path, out: Path, **options: Any) -> InputError:
     """Return what is said of a fleet that is refused; of one worker, if nothing else is said."""
     with pytest.raises(InputError) as caught:
-        truearm.fleet(file, out=out, **(how or {"workers": 1}))
+        truearm.fleet(file, out=out, **(options or {"workers": 1}))
     return caught.value
 
 
@@ -69,13 +69,13 @@ def test_each_robot_is_what_one_calibration_of_it_finds() -> None:
     free, rng = series.problem.free, np.random.default_rng(0)
     truth = free.nominal + free.prior * series.drawn * rng.standard_normal((1, len(free.names)))
     readings = series.problem.at(truth).residual + rng.standard_normal((1, series.problem.rows))
-    found, _, settled = calibrated(series.problem, readings)
+    estimates, _, settled = calibrated(series.problem, readings)
     data = series.problem.data
     moved = data.position + readings[0].reshape(-1, 3) * known(data.sigma)[:, None]
-    fit = identify(series.made.robot, replace(data, position=moved), named_model("geometric"))
+    fit = identify(series.experiment.robot, replace(data, position=moved), named_model("geometric"))
     alone = np.array([fit.robot.parameters[name].value for name in free.names])
     assert settled.all()
-    assert np.abs((found[0] - alone) / free.prior).max() < 0.05
+    assert np.abs((estimates[0] - alone) / free.prior).max() < 0.05
 
 
 def test_errors_are_those_of_the_drawn_robot() -> None:
@@ -97,11 +97,11 @@ def test_robots_beside_it_change_no_digit() -> None:
 
 
 def test_parts_and_who_computes_them_change_no_digit(tmp_path: Path) -> None:
-    one = truearm.fleet(manifest(tmp_path, 5), out=tmp_path / "one", workers=1)
+    by_one = truearm.fleet(manifest(tmp_path, 5), out=tmp_path / "one", workers=1)
     with ThreadPoolExecutor(2) as executor:
         other = truearm.fleet(manifest(tmp_path, 1), out=tmp_path / "other", executor=executor)
     two = truearm.fleet(manifest(tmp_path, 3), out=tmp_path / "two", workers=2)
-    rows = [without_seconds([*found.recorded.rows()]) for found in (one, other, two)]
+    rows = [without_seconds([*fleet.recorded.rows()]) for fleet in (by_one, other, two)]
     assert rows[0] == rows[1] == rows[2]
     (table,) = {(tmp_path / folder / "robots.csv").read_text() for folder in ("one", "other", "two")}
     assert table.startswith("name,of,date,status,")
@@ -132,13 +132,13 @@ def test_what_is_on_disk_is_not_computed_twice(tmp_path: Path) -> None:
     assert not (out / "fleet.json").exists()
     with ThreadPoolExecutor(1) as inner:
         executor = Counting(inner)
-        found = truearm.fleet(file, out=out, executor=executor)
+        fleet = truearm.fleet(file, out=out, executor=executor)
         assert executor.count == 1
-        assert found.run == Run(3, 2)
+        assert fleet.run == Run(3, 2)
         again = truearm.fleet(file, out=out, executor=executor)
         assert executor.count == 1
     whole = truearm.fleet(file, out=tmp_path / "whole", workers=1)
-    assert again.content() == found.content() == whole.content()
+    assert again.content() == fleet.content() == whole.content()
 
 
 def test_a_full_disk_is_named_and_what_was_written_before_is_kept(
@@ -169,21 +169,21 @@ def test_a_folder_belongs_to_its_manifest(tmp_path: Path, monkeypatch: pytest.Mo
     other = manifest(tmp_path, name="other.yaml", configurations="plan.csv", seed=2)
     assert "of another manifest" in str(refused(other, out))
     truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, seed=1, out=plan)
-    told = refused(file, out)
-    assert "has changed since" in str(told)
-    assert told.came == "plan.csv"
+    refusal = refused(file, out)
+    assert "has changed since" in str(refusal)
+    assert refusal.came == "plan.csv"
     monkeypatch.setattr(recorded, "__version__", "99.0")
     assert "another version of truearm" in str(refused(file, out))
 
 
 def test_folders_of_others_are_refused(tmp_path: Path) -> None:
     file = manifest(tmp_path)
-    for name, made in (("record.json", "{}"), ("record.json", "no JSON"), ("fleet.json", "mine")):
-        out = tmp_path / f"out-{made}"
+    for name, content in (("record.json", "{}"), ("record.json", "no JSON"), ("fleet.json", "mine")):
+        out = tmp_path / f"out-{content}"
         out.mkdir()
-        (out / name).write_text(made)
+        (out / name).write_text(content)
         assert refused(file, out).where is not None
-        assert (out / name).read_text() == made
+        assert (out / name).read_text() == content
     (tmp_path / "out" / "parts" / "mine").mkdir(parents=True)
     assert "whose it is" in str(refused(file, tmp_path / "out"))
 
@@ -224,19 +224,19 @@ def test_a_part_that_is_not_as_it_was_written_is_named(
     file, out = manifest(tmp_path), shutil.copytree(finished, tmp_path / "out")
     part = out / "parts" / "0000" / "0000002.jsonl"
     whole, begun = part.read_text(), list[object]()
-    monkeypatch.setattr("truearm.fleets.running._computed", lambda *given: begun.append(given))
-    for damage, done in DAMAGES.items():
+    monkeypatch.setattr("truearm.fleets.running._computed", lambda *arguments: begun.append(arguments))
+    for damage, damaged in DAMAGES.items():
         begun.clear()
-        part.write_text(done(whole))
-        told = refused(file, out)
-        assert (told.where, told.parameter, begun) == (str(part), "out", []), damage
+        part.write_text(damaged(whole))
+        refusal = refused(file, out)
+        assert (refusal.where, refusal.parameter, begun) == (str(part), "out", []), damage
         if damage not in HASH_ALONE:  # and it is named with the hash of its changes too
-            text = done("".join(whole.splitlines(keepends=True)[:-1]))
+            text = damaged("".join(whole.splitlines(keepends=True)[:-1]))
             assert text != "".join(whole.splitlines(keepends=True)[:-1]), damage
             part.write_text(text + json.dumps({"sha256": hashlib.sha256(text.encode()).hexdigest()}) + "\n")
-            told = refused(file, out)
-            said = (told.what, told.where)
-            assert said == ("this part of the fleet is not as it was written", str(part)), damage
+            refusal = refused(file, out)
+            message_and_place = (refusal.what, refusal.where)
+            assert message_and_place == ("this part of the fleet is not as it was written", str(part)), damage
 
 
 class Exchanging(Executor):
@@ -252,7 +252,7 @@ class Exchanging(Executor):
 
 
 @pytest.mark.parametrize(
-    ("wrong", "came"),
+    ("wrong", "stated"),
     [
         (lambda work, task: "foo", "an object of type str came back"),
         (lambda work, task: None, "an object of type NoneType came back"),
@@ -264,10 +264,10 @@ class Exchanging(Executor):
     ids=["a text", "nothing", "no text", "another text", "another part", "changed"],
 )
 def test_what_an_executor_must_not_return_is_refused_and_not_written(
-    tmp_path: Path, wrong: Callable[[Any, Any], object], came: str
+    tmp_path: Path, wrong: Callable[[Any, Any], object], stated: str
 ) -> None:
-    told = refused(manifest(tmp_path), tmp_path / "out", executor=Exchanging(wrong))
-    assert (told.parameter, came in str(told.came)) == ("executor", True)
+    refusal = refused(manifest(tmp_path), tmp_path / "out", executor=Exchanging(wrong))
+    assert (refusal.parameter, stated in str(refusal.came)) == ("executor", True)
     assert [*(tmp_path / "out").rglob("*.jsonl")] == []
 
 
@@ -298,14 +298,14 @@ def test_a_file_that_changes_between_its_hash_and_its_use_is_refused(
     plan = tmp_path / "plan.csv"
     truearm.simulate("irb120", truth="nominal", poses=12, noise=0.0, out=plan)
 
-    def late(asked: ExperimentEntry, where: str) -> Experiment:
+    def late(asked: ExperimentEntry, place: str) -> Experiment:
         plan.write_text(plan.read_text() + "\n")
-        return experiment(asked, where)
+        return experiment(asked, place)
 
     monkeypatch.setattr("truearm.fleets.running.experiment", late)
     file = manifest(tmp_path, configurations="plan.csv")
-    told = refused(file, tmp_path / "out")
-    assert ("changed while it was read" in str(told), told.where) == (True, "plan.csv")
+    refusal = refused(file, tmp_path / "out")
+    assert ("changed while it was read" in str(refusal), refusal.where) == (True, "plan.csv")
 
 
 def test_two_runs_at_once_in_one_folder_are_refused(tmp_path: Path) -> None:
@@ -319,12 +319,12 @@ def test_two_runs_at_once_in_one_folder_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("other", ["the same manifest", "another manifest"])
 def test_of_two_runs_that_begin_at_once_one_is_told_of_the_other(tmp_path: Path, other: str) -> None:
     pytest.importorskip("fcntl")
-    one, out = read_manifest(manifest(tmp_path)), tmp_path / "out"
+    first, out = read_manifest(manifest(tmp_path)), tmp_path / "out"
     changed = {"seed": 7} if other == "another manifest" else {}
     two = manifest(tmp_path, name="two.yaml", **changed)
     second = Recorded(out, read_manifest(two))
     assert second.missing() == 3
-    with Recorded(out, one).alone():
+    with Recorded(out, first).alone():
         for begin in (second.missing, second.alone().__enter__):
             said_of(None, "another run computes parts there", begin)
         assert "another run computes parts there" in str(refused(two, out))
@@ -354,16 +354,16 @@ def test_many_runs_that_begin_at_once_leave_one_fleet(tmp_path: Path, kind: str)
             return ""
 
         with ThreadPoolExecutor(4) as pool:
-            told = [*pool.map(run, [file, *others])]
-        assert "" in told
-        assert {*told} <= {"", "another run computes parts there", "the parts there are of another manifest"}
+            messages = [*pool.map(run, [file, *others])]
+        assert "" in messages
+        assert {*messages} <= {"", "another run computes parts there", "the parts there are of another manifest"}
 
 
 def test_robots_of_lost_parts_are_named_and_an_error(tmp_path: Path) -> None:
     file, out = manifest(tmp_path), tmp_path / "out"
-    found = truearm.fleet(file, out=out, workers=1)
+    fleet = truearm.fleet(file, out=out, workers=1)
     (out / "parts" / "0000" / "0000002.jsonl").unlink()
-    less = Fleet(found.recorded, Run(3, 0, ("a worker died",), ("robot-3", "robot-4")))
+    less = Fleet(fleet.recorded, Run(3, 0, ("a worker died",), ("robot-3", "robot-4")))
     assert ("workers-died", "error") in [(notice.code, notice.level) for notice in less.warnings]
     assert less.content()["missing"] == ["robot-3", "robot-4"]
     assert "A worker died." in less.lines()
@@ -372,20 +372,20 @@ def test_robots_of_lost_parts_are_named_and_an_error(tmp_path: Path) -> None:
 def test_a_calibration_that_does_not_settle_is_a_row_and_without_any_result_it_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def unsettled(*given: Any) -> Any:
-        found, deviation, settled = calibrated(*given)
+    def unsettled(*arguments: Any) -> Any:
+        estimates, deviation, settled = calibrated(*arguments)
         settled[:lost] = False
-        return found, deviation, settled
+        return estimates, deviation, settled
 
     monkeypatch.setattr("truearm.fleets.series.calibrated", unsettled)
     lost = 1
-    found = truearm.fleet(manifest(tmp_path), out=tmp_path / "out", workers=1)
-    assert found.content()["calibrated"] == 2
-    assert "robots-failed" in [notice.code for notice in found.warnings]
-    assert next(found.recorded.rows()).message == "the calibration did not settle"
+    fleet = truearm.fleet(manifest(tmp_path), out=tmp_path / "out", workers=1)
+    assert fleet.content()["calibrated"] == 2
+    assert "robots-failed" in [notice.code for notice in fleet.warnings]
+    assert next(fleet.recorded.rows()).message == "the calibration did not settle"
     lost = 9
-    found = truearm.fleet(manifest(tmp_path), out=tmp_path / "none", workers=1)
-    assert ("no-result", "error") in [(notice.code, notice.level) for notice in found.warnings]
+    fleet = truearm.fleet(manifest(tmp_path), out=tmp_path / "none", workers=1)
+    assert ("no-result", "error") in [(notice.code, notice.level) for notice in fleet.warnings]
 
 
 def test_what_cannot_be_meant_is_refused_and_nothing_written(tmp_path: Path) -> None:
@@ -407,12 +407,12 @@ def test_what_cannot_be_meant_is_refused_and_nothing_written(tmp_path: Path) -> 
         ({"seed": -1}, "0 or more"),
         ({"truth": "random"}, "not known here"),
     )
-    for entries, what in wrong:
+    for entries, message in wrong:
         file = manifest(tmp_path, **entries)
-        told = refused(file, out)
-        assert (told.parameter, what in str(told)) == ("manifest", True), told
-        assert str(told.where).startswith(f"{file}, experiment"), told
-    for text, what in (
+        refusal = refused(file, out)
+        assert (refusal.parameter, message in str(refusal)) == ("manifest", True), refusal
+        assert str(refusal.where).startswith(f"{file}, experiment"), refusal
+    for text, message in (
         ("truearm: truearm-fleet/1\n", "one of them"),
         ("truearm: truearm-fleet/1\nexperiment: {robot: irb120, count: 2, noise: 1}\n", "has a unit"),
         (
@@ -423,14 +423,14 @@ def test_what_cannot_be_meant_is_refused_and_nothing_written(tmp_path: Path) -> 
         ("truearm: truearm-fleet/2\n", "truearm-fleet/1"),
     ):
         (tmp_path / "fleet.yaml").write_text(text)
-        assert what in str(refused(tmp_path / "fleet.yaml", out))
+        assert message in str(refused(tmp_path / "fleet.yaml", out))
     assert not out.exists()
 
 
 def test_one_of_several_does_the_parts(tmp_path: Path) -> None:
     file = manifest(tmp_path)
-    told = refused(file, tmp_path / "out", workers=2, scheduler="127.0.0.1:1")
-    assert told.parameter == "workers, scheduler"
+    refusal = refused(file, tmp_path / "out", workers=2, scheduler="127.0.0.1:1")
+    assert refusal.parameter == "workers, scheduler"
     wrong: Any = "four"
     assert refused(file, tmp_path / "out", executor=wrong).parameter == "executor"
     assert refused(file, tmp_path / "out", workers=5000).parameter == "workers"

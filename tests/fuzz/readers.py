@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from ruamel.yaml import YAML
@@ -21,7 +21,7 @@ from truearm.engine.data.readers.canonical import csv_text, read_csv
 from truearm.engine.data.readers.configurations import read_poses
 from truearm.engine.data.readers.mapping import MappingFile
 from truearm.engine.data.readers.robodk import read_robodk
-from truearm.engine.data.readers.table import read_table
+from truearm.engine.data.readers.table import read_noting
 from truearm.engine.fit.bounds import read_bounds
 from truearm.engine.motion.constraints import read_constraints
 from truearm.engine.motion.path_file import read_path
@@ -45,7 +45,6 @@ from truearm.measuring.campaign import Campaign
 from truearm.measuring.reading_log import ReadingLog, read_about
 from truearm.measuring.session import Quality, Session
 from truearm.measuring.watched_folder import WatchedFolder
-from truearm.robot_files.formats import complete_dh_csv, read_dh_csv
 from truearm.robot_files.jobs import import_ur_kinematics
 
 
@@ -106,7 +105,7 @@ def _robot_file(name: str) -> Reader:
 
 def _table(table: str, mapping: str, **more: str) -> Reader:
     given = {"table.csv": table, "map.yaml": mapping, **{f"{name}.csv": f"{file}.csv" for name, file in more.items()}}
-    return Reader(given, lambda folder: _dataset(read_table(folder / "table.csv", folder / "map.yaml"), folder))
+    return Reader(given, lambda folder: _dataset(read_noting(folder / "table.csv", folder / "map.yaml")[0], folder))
 
 
 def _matrices(folder: Path) -> None:
@@ -120,10 +119,6 @@ def _kinematics(name: str) -> Reader:
         _robot(made, folder)
 
     return Reader({name: name}, read)
-
-
-def _dh_table(name: str, convention: Any) -> Reader:
-    return Reader({"dh.csv": name}, lambda folder: complete_dh_csv(read_dh_csv(folder / "dh.csv", convention), []))
 
 
 def _programs(language: str, *names: str) -> Reader:
@@ -208,7 +203,7 @@ READERS: Final[Mapping[str, Reader]] = {
     "whole-table": _table("whole.csv", "whole.yaml", driven="driven"),
     "workbook": Reader(
         {"points.xlsx": "points.xlsx", "map.yaml": "workbook.yaml"},
-        lambda folder: _dataset(read_table(folder / "points.xlsx", folder / "map.yaml"), folder),
+        lambda folder: _dataset(read_noting(folder / "points.xlsx", folder / "map.yaml")[0], folder),
     ),
     "guess": Reader({"table.csv": "whole.csv"}, lambda folder: _guess(folder / "table.csv")),
     "guess-workbook": Reader({"points.xlsx": "points.xlsx"}, lambda folder: _guess(folder / "points.xlsx")),
@@ -253,9 +248,6 @@ READERS: Final[Mapping[str, Reader]] = {
     "ur-conf": _kinematics("calibration.conf"),
     "ur-ros": _kinematics("ros-kinematics.yaml"),
     "urdf": _robot_file("arm.urdf"),
-    "dh": _dh_table("dh.csv", "standard-dh"),
-    "mdh": _dh_table("mdh.csv", "modified-dh"),
-    "hayati": _dh_table("hayati.csv", "hayati"),
     "fleet": Reader(
         {name: name for name in ("fleet.yaml", "robots.csv", "data.csv", "again.csv", "bounds.yaml")},
         lambda folder: read_manifest(folder / "fleet.yaml"),

@@ -234,8 +234,7 @@ def _robots(place: Path) -> None:
     """Write robots of other formats."""
     truearm.import_ur_kinematics(**EXAMPLES["import_ur_kinematics"](place))
     truearm.export(place / "ur10-controller.yaml", "ur-kinematics", out=place / "ros-kinematics.yaml")
-    for form, name in (("urdf", "arm.urdf"), ("dh", "dh.csv"), ("mdh", "mdh.csv"), ("hayati", "hayati.csv")):
-        truearm.export("puma560" if form == "mdh" else "irb1600" if form == "dh" else "irb120", form, out=place / name)
+    truearm.export("irb120", "urdf", out=place / "arm.urdf")
 
 
 def _new_robot(place: Path) -> None:
@@ -328,9 +327,6 @@ MADE: dict[str, Callable[[Path], object]] = {
     "ur10-controller.yaml": _robots,
     "ros-kinematics.yaml": _robots,
     "arm.urdf": _robots,
-    "dh.csv": _robots,
-    "mdh.csv": _robots,
-    "hayati.csv": _robots,
     "performance.yaml": _performance,
     "tested.yaml": _performance,
     "attained.csv": _performance,

@@ -47,24 +47,24 @@ def some_lengths(rng: np.random.Generator, n: int) -> tuple[Array, Array, Array]
 
 
 def test_the_counts_and_the_printed_pairs() -> None:
-    found = poses()
+    all_poses = poses()
     assert len(designs()) == len({design.name for design in designs()}) == 36
     assert len(set(assemblies())) == len(list(assemblies())) == 144
-    assert [pose.number for pose in found] == list(range(1, 73))
-    assert sorted(near_equal(found)) == sorted(pair for group in PRINTED for pair in group)
-    kept = [pose.number for pose in distinct(found)]
-    assert sorted(set(range(1, 73)) - set(kept)) == CROSSED_OUT
+    assert [pose.number for pose in all_poses] == list(range(1, 73))
+    assert sorted(near_equal(all_poses)) == sorted(pair for group in PRINTED for pair in group)
+    numbers = [pose.number for pose in distinct(all_poses)]
+    assert sorted(set(range(1, 73)) - set(numbers)) == CROSSED_OUT
 
 
 def test_the_groups_lie_where_they_should_and_the_next_is_only_just_apart() -> None:
-    found = {pose.number: pose for pose in poses()}
+    by_number = {pose.number: pose for pose in poses()}
     for group, apart in zip(PRINTED, (11.1, 27.0, 35.7), strict=True):
         for a, b in group:
-            angle, way = distance(found[a], found[b])
+            angle, way = distance(by_number[a], by_number[b])
             assert np.degrees(angle) == pytest.approx(8.35, abs=0.005)
             assert way * 1e3 == pytest.approx(apart, abs=0.06)
     near = {pair for group in PRINTED for pair in group}
-    others = [distance(found[a], found[b]) for a, b in combinations(found, 2) if (a, b) not in near]
+    others = [distance(by_number[a], by_number[b]) for a, b in combinations(by_number, 2) if (a, b) not in near]
     angle, way = min((angle, way) for angle, way in others if way < 0.050)
     assert np.degrees(angle) == pytest.approx(30.14, abs=0.01)
     assert way * 1e3 == pytest.approx(39.8, abs=0.05)
@@ -120,9 +120,9 @@ def test_the_tripod_finds_a_known_point_on_either_side() -> None:
     feet = rng.uniform(-0.3, 0.3, (3, 3))
     point = rng.uniform(-0.3, 0.3, 3)
     legs = np.linalg.norm(feet - point, axis=1)
-    found = [tripod(feet, legs, side, ("a", "b", "c")) for side in (1, -1)]
-    assert min(np.abs(p - point).max() for p in found) < 1e-14
-    for p in found:
+    points = [tripod(feet, legs, side, ("a", "b", "c")) for side in (1, -1)]
+    assert min(np.abs(p - point).max() for p in points) < 1e-14
+    for p in points:
         assert np.linalg.norm(feet - p, axis=1) == pytest.approx(legs, abs=1e-14)
 
 
@@ -198,16 +198,16 @@ def test_the_closed_form_is_the_best_fit_in_space() -> None:
     R, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     R *= np.linalg.det(R)
     exact = triangle_ @ R.T + [0.4, -0.1, 0.05]
-    found = world_frame(exact, sides)
-    assert found.frame.rotation == pytest.approx(R, abs=1e-12)
-    assert found.frame.translation == pytest.approx([0.4, -0.1, 0.05], abs=1e-13)
-    assert np.abs(found.residual).max() < 1e-13
+    fitted = world_frame(exact, sides)
+    assert fitted.frame.rotation == pytest.approx(R, abs=1e-12)
+    assert fitted.frame.translation == pytest.approx([0.4, -0.1, 0.05], abs=1e-13)
+    assert np.abs(fitted.residual).max() < 1e-13
     points = exact + rng.normal(0, 2e-4, (3, 3))
-    found = world_frame(points, sides)
+    fitted = world_frame(points, sides)
     best, place = rigid_motion(triangle_, points)
-    assert found.frame.rotation == pytest.approx(best, abs=1e-12)
-    assert found.frame.translation == pytest.approx(place, abs=1e-13)
-    assert found.plain.translation == pytest.approx(points[0], abs=1e-15)
+    assert fitted.frame.rotation == pytest.approx(best, abs=1e-12)
+    assert fitted.frame.translation == pytest.approx(place, abs=1e-13)
+    assert fitted.plain.translation == pytest.approx(points[0], abs=1e-15)
     with pytest.raises(InputError, match="one line"):
         world_frame(np.outer([0.0, 1.0, 2.0], [1.0, 1.0, 0.0]), sides)
 
@@ -216,14 +216,14 @@ def test_the_distances_make_the_frame_better_by_a_tenth_and_more() -> None:
     """About 15 % in the document; 12 % with errors of the same size in all directions, 34 % with none across."""
     rng = np.random.default_rng(7)
     cups = triangle([0.3] * 3, "B")
-    where = np.array([0.15, 0.087, 0.245]) + rng.normal(0, 0.1, (100, 3))
+    places = np.array([0.15, 0.087, 0.245]) + rng.normal(0, 0.1, (100, 3))
 
     def gain(across: float) -> float:
         errors = np.zeros(2)
         for _ in range(400):
-            found = world_frame(cups + rng.normal(0, 1e-4, (3, 3)) * [1, 1, across], [0.3] * 3)
-            for n, frame in enumerate((found.plain, found.frame)):
-                off = where @ frame.rotation.T + np.array(frame.translation) - where
+            fitted = world_frame(cups + rng.normal(0, 1e-4, (3, 3)) * [1, 1, across], [0.3] * 3)
+            for n, frame in enumerate((fitted.plain, fitted.frame)):
+                off = places @ frame.rotation.T + np.array(frame.translation) - places
                 errors[n] += np.linalg.norm(off, axis=1).mean()
         return float(1 - errors[1] / errors[0])
 

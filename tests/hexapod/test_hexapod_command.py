@@ -22,11 +22,11 @@ BASE, TOOL = ("B1-B2", "B2-B3", "B3-B1"), ("T1-T2", "T2-T3", "T3-T1")
 
 
 def test_uncertainty(truearm: Truearm) -> None:
-    found = json.loads(truearm("hexapod", "uncertainty", "--trials", "20000", "--json").out)
-    assert list(found) == ["solutions", "monte_carlo"]
-    assert [list(row) for row in found["solutions"]] == [["t1", "t2", "t3", "t3_as_printed"]] * 4
-    assert [row["t3"] for row in found["solutions"]] == pytest.approx([3.359, 3.052, 2.886, 3.331], abs=5e-4)
-    for row, drawn in zip(found["solutions"], found["monte_carlo"], strict=True):
+    summary = json.loads(truearm("hexapod", "uncertainty", "--trials", "20000", "--json").out)
+    assert list(summary) == ["solutions", "monte_carlo"]
+    assert [list(row) for row in summary["solutions"]] == [["t1", "t2", "t3", "t3_as_printed"]] * 4
+    assert [row["t3"] for row in summary["solutions"]] == pytest.approx([3.359, 3.052, 2.886, 3.331], abs=5e-4)
+    for row, drawn in zip(summary["solutions"], summary["monte_carlo"], strict=True):
         assert drawn == pytest.approx({key: row[key] for key in drawn}, rel=0.02)
     assert "3.359" in truearm("hexapod", "uncertainty", "--trials", "100").out
 
@@ -56,9 +56,9 @@ def test_from_plan_to_data(truearm: Truearm, tmp_path: Path) -> None:
     run = truearm("hexapod", "solve", sheet, "--out", data)
     assert run.code == 0
     assert f"Left out, not all legs measured: {rows[1]['configuration']}" in run.out
-    found = read_csv(data)
-    assert found.configurations == len(rows) - 1
-    assert found.position == pytest.approx(read_sheet(sheet).dataset().position, abs=1e-12)
+    dataset = read_csv(data)
+    assert dataset.configurations == len(rows) - 1
+    assert dataset.position == pytest.approx(read_sheet(sheet).dataset().position, abs=1e-12)
     entries = json.loads(truearm("hexapod", "solve", sheet, "--json").out)["poses"]
     assert list(entries[0]) == ["configuration", "design", "solution", "legs", "place", "side", "cups_mm"]
 
@@ -98,9 +98,9 @@ def test_several_places_and_sides_from_plan_to_data(truearm: Truearm, tmp_path: 
     assert run.code == 0
     assert "place fixture_2, side 4, design" in run.out
     assert "Tool changer, from 5 pairs of readings with 2 attachments:" in run.out
-    found = read_csv(data)
-    assert found.fixtures == ("fixture_1", "fixture_2")
-    assert found.sigma is not None
+    dataset = read_csv(data)
+    assert dataset.fixtures == ("fixture_1", "fixture_2")
+    assert dataset.sigma is not None
     summary = json.loads(truearm("hexapod", "solve", sheet, "--json").out)
     keys = "attachments pairs deviation_mm rest_mm mean_mm largest_mm ballbar_mm"
     assert list(summary["tool_changer"]) == keys.split()
@@ -130,11 +130,11 @@ def test_world_frame(truearm: Truearm, tmp_path: Path) -> None:
     lines += [f"B{n},{','.join(map(repr, row))}" for n, row in enumerate(joints.tolist(), 1)]
     file.write_text("\n".join(lines) + "\n")
     words = ["hexapod", "world-frame", "irb120", file, "--base-sides", "300.3,300,299.6"]
-    found = json.loads(truearm(*words, "--json").out)
-    assert list(found) == ["position_mm", "quaternion", "plain", "distances_by_robot_mm", "residuals_mm"]
-    assert found["position_mm"] == pytest.approx([250, -100, 100], abs=1e-6)
-    assert found["quaternion"] == pytest.approx([1, 0, 0, 0], abs=1e-9)
-    assert found["residuals_mm"] == pytest.approx([0, 0, 0], abs=1e-6)
+    summary = json.loads(truearm(*words, "--json").out)
+    assert list(summary) == ["position_mm", "quaternion", "plain", "distances_by_robot_mm", "residuals_mm"]
+    assert summary["position_mm"] == pytest.approx([250, -100, 100], abs=1e-6)
+    assert summary["quaternion"] == pytest.approx([1, 0, 0, 0], abs=1e-9)
+    assert summary["residuals_mm"] == pytest.approx([0, 0, 0], abs=1e-6)
     assert "x 250.0000" in truearm(*words).out
 
 
@@ -146,14 +146,14 @@ def test_poses_are_counted_and_one_is_solved(truearm: Truearm) -> None:
     assert [10, 37] in counts["near_equal"]
     assert "72 poses" in truearm("hexapod", "enumerate").out
     words = ("hexapod", "solve", "--pose", "7", "--legs", "300,300,300,300,300,300")
-    found = json.loads(truearm(*words, "--json").out)
-    assert found["left_out"] == []
-    assert np.array(found["poses"][0]["cups_mm"]) == pytest.approx(poses()[6].cups * 1e3, abs=1e-9)
+    summary = json.loads(truearm(*words, "--json").out)
+    assert summary["left_out"] == []
+    assert np.array(summary["poses"][0]["cups_mm"]) == pytest.approx(poses()[6].cups * 1e3, abs=1e-9)
     assert "T3  x" in truearm(*words).out
-    for more, said in (
+    for more, expected in (
         (["--legs", "300;300"], "numbers separated by commas"),
         (["--out", "data.csv"], "--out: one pose without joint positions is no data file"),
         (["--legs", "1e12,300,300,300,300,300"], "too large to be plausible"),
     ):
         run = truearm(*words, *more)
-        assert (run.code, said in run.err) == (2, True), more
+        assert (run.code, expected in run.err) == (2, True), more

@@ -27,11 +27,11 @@ def test_uncertainty_is_repeated_with_its_seed() -> None:
 
 
 def test_one_pose_is_solved_from_any_sequence_of_lengths() -> None:
-    found = truearm.hexapod_solve(pose=7, legs=np.array(LEGS), base_sides=[0.3] * 3)  # type: ignore[arg-type]
-    assert found.poses[0].cups == pytest.approx(poses()[6].cups, abs=1e-12)
-    assert found.data is None
+    solution = truearm.hexapod_solve(pose=7, legs=np.array(LEGS), base_sides=[0.3] * 3)  # type: ignore[arg-type]
+    assert solution.poses[0].cups == pytest.approx(poses()[6].cups, abs=1e-12)
+    assert solution.data is None
     with pytest.raises(ValueError, match="no joint positions"):
-        found.save("data.csv")
+        solution.save("data.csv")
 
 
 def test_a_fixture_is_a_transform_or_numbers(tmp_path: Path) -> None:
@@ -67,8 +67,8 @@ def test_a_plan_and_its_sheet_are_written_and_solved(tmp_path: Path) -> None:
     assert len(repr(solved)) <= 2000
 
 
-def one_pose(**given: Any) -> object:
-    return truearm.hexapod_solve(**{"pose": 7, "legs": LEGS, **given})
+def one_pose(**options: Any) -> object:
+    return truearm.hexapod_solve(**{"pose": 7, "legs": LEGS, **options})
 
 
 SIDES, JOINTS = (0.3, 0.3, 0.3), np.zeros((3, 6))

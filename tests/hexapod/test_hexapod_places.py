@@ -92,28 +92,28 @@ def test_the_tool_changer_is_found(robot: Robot, plan: HexapodPlan, tmp_path: Pa
     file.write_text(text)
     solved = truearm.hexapod_solve(file, reach=5e-3)
     assert solved.attached is not None
-    assert solved.attached.found is not None
+    assert solved.attached.repeatability is not None
     _, cups = with_cups(robot)
     shift, turn = ToolChanger.shift, ToolChanger.turn
     true = np.sqrt(shift**2 + turn**2 * 2 / 3 * (cups**2).sum(axis=1))
     # 3 freedoms of the attachments in 6 directions: a single draw is good to about a quarter of the truth
-    assert solved.attached.found.changer == pytest.approx(true, rel=0.7)
-    assert solved.attached.found.rest is not None
-    assert solved.attached.found.rest.max() < 3e-6
+    assert solved.attached.repeatability.changer == pytest.approx(true, rel=0.7)
+    assert solved.attached.repeatability.rest is not None
+    assert solved.attached.repeatability.rest.max() < 3e-6
     assert solved.notices == ()
     assert any("The data declare it." in line for line in solved.lines())
     assert solved.data is not None
     assert solved.data.sigma is not None
     # most rows are of the first attachment, which is where the tool is found; the others are declared to differ more
-    assert solved.data.sigma[:3].max() < 0.5 * solved.attached.found.changer.min()
-    assert (solved.data.sigma[-3:] > solved.attached.found.changer).all()
+    assert solved.data.sigma[:3].max() < 0.5 * solved.attached.repeatability.changer.min()
+    assert (solved.data.sigma[-3:] > solved.attached.repeatability.changer).all()
 
 
 def test_attachments_that_were_not_compared_are_told(robot: Robot, plan: HexapodPlan, tmp_path: Path) -> None:
     rows, cups, _ = campaign(plan, Twin(robot), EXACT, changer=False)
-    told = [replace(row, attachment=str(1 + number % 2)) for number, row in enumerate(rows)]
+    attached = [replace(row, attachment=str(1 + number % 2)) for number, row in enumerate(rows)]
     file = tmp_path / "sheet.csv"
-    file.write_text(filled_sheet(Twin(robot), told, cups, ballbar(np.random.default_rng(0), EXACT)))
+    file.write_text(filled_sheet(Twin(robot), attached, cups, ballbar(np.random.default_rng(0), EXACT)))
     solved = truearm.hexapod_solve(file, reach=5e-3)
     assert [(notice.code, notice.level) for notice in solved.notices] == [("attachments-not-compared", "warning")]
     assert solved.lines()[-1].startswith("Warning (attachments-not-compared): The tool was attached 2 times")
@@ -122,9 +122,9 @@ def test_attachments_that_were_not_compared_are_told(robot: Robot, plan: Hexapod
 
 
 def test_a_plan_names_places_and_counts_sides(plan: HexapodPlan) -> None:
-    said = plan.summary()
-    assert [place["place"] for place in said["places"]] == ["fixture_1", "fixture_2"]
-    assert said["poses"] == 2 * 4 * 72
+    summary = plan.summary()
+    assert [place["place"] for place in summary["places"]] == ["fixture_1", "fixture_2"]
+    assert summary["poses"] == 2 * 4 * 72
     rows = plan.reachable.rows
     assert len({row.configuration for row in rows}) == len(rows) == len(plan.reachable.clearance)
     again = [row for row in rows if row.attachment != "1"]

@@ -53,7 +53,7 @@ def test_the_distance_of_segments_is_the_smallest_there_is() -> None:
     ends = rng.uniform(-1, 1, (4, 3, 40))
     ends[1, :, :5] = ends[0, :, :5] + 2 * (ends[3, :, :5] - ends[2, :, :5])  # parallel
     ends[1, :, 5] = ends[0, :, 5]  # a point
-    found = segment_distance(*ends)
+    distances = segment_distance(*ends)
     for n in range(40):
         p1, q1, p2, q2 = ends[:, :, n]
 
@@ -62,7 +62,7 @@ def test_the_distance_of_segments_is_the_smallest_there_is() -> None:
 
         starts = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
         best = min(minimize(apart, start, bounds=[(0, 1), (0, 1)]).fun for start in starts)
-        assert found[n] == pytest.approx(np.sqrt(best), abs=2e-5)
+        assert distances[n] == pytest.approx(np.sqrt(best), abs=2e-5)
     crossing = np.array([[[-1], [0], [0]], [[1], [0], [0]], [[0], [-1], [0.25]], [[0], [1], [0.25]]], float)
     assert segment_distance(*crossing) == pytest.approx([0.25], abs=1e-15)
 
@@ -89,13 +89,13 @@ def test_every_planned_configuration_makes_all_legs_nominal(arm: Arm, plan: Reac
     assert plan.poses_reached > 40
     assert len(plan.rows) > plan.poses_reached
     assert len(plan.rows) + sum(plan.left_out.values()) >= 72
-    for row, room in zip(plan.rows, plan.clearance, strict=True):
+    for row, gap in zip(plan.rows, plan.clearance, strict=True):
         frames = twin.target_frames(row.joints)
         cups = np.array([frames[name][:3, 3] for name in ("1", "2", "3")])
         assert leg_lengths(row.design, base, cups) == pytest.approx(np.full(6, 0.3), abs=2e-5)  # 93.7, not 93.675 mm
         assert ((row.joints >= low) & (row.joints <= high) & (np.abs(row.joints) <= np.pi + 1e-9)).all()
         assert row.branch.startswith(("front-up", "back-down"))
-        assert room > 0
+        assert gap > 0
 
 
 def test_the_plan_does_not_depend_on_where_the_robot_stands(arm: Arm, plan: Reachable) -> None:
@@ -164,18 +164,18 @@ def campaign(arm: Arm, plan: Reachable) -> tuple[Twin, Campaign]:
 def test_what_is_beyond_the_range_is_skipped_until_the_first_calibration(
     arm: Arm, plan: Reachable, campaign: tuple[Twin, Campaign]
 ) -> None:
-    twin, done = campaign
+    twin, measured = campaign
     rows = plan.rows[::2]
-    assert sorted((*done.first, *done.second, *done.out_of_range)) == list(range(len(rows)))
-    assert 8 < len(done.first) < len(rows)
-    assert len(done.second) > 8
-    assert done.data.configurations == len(done.first) + len(done.second)
+    assert sorted((*measured.first, *measured.second, *measured.out_of_range)) == list(range(len(rows)))
+    assert 8 < len(measured.first) < len(rows)
+    assert len(measured.second) > 8
+    assert measured.data.configurations == len(measured.first) + len(measured.second)
     inside = 0
     for row, planned in enumerate(rows):
         frames = twin.target_frames(planned.joints)
         cups = np.array([frames[name][:3, 3] for name in ("1", "2", "3")])
-        inside += bool(np.abs(leg_lengths(planned.design, done.base_cups, cups) - 0.3).max() < 1e-3) == (
-            row in done.first
+        inside += bool(np.abs(leg_lengths(planned.design, measured.base_cups, cups) - 0.3).max() < 1e-3) == (
+            row in measured.first
         )
     assert inside >= len(rows) - 1  # the noise may decide for one at the very edge
 
@@ -184,19 +184,19 @@ def test_the_final_calibration_sees_all_and_a_tracker_is_better_away_from_the_fi
     arm: Arm, campaign: tuple[Twin, Campaign]
 ) -> None:
     robot, _ = arm
-    twin, done = campaign
+    twin, measured = campaign
     rng = np.random.default_rng(11)
     seen = measure(twin, robot.random_configurations(150, rng), 0.0, rng)
-    frame = Transform.from_matrix(*_frame_of(done.base_cups))
+    frame = Transform.from_matrix(*_frame_of(measured.base_cups))
     from_fixture = replace(seen, position=(seen.position - np.array(frame.translation)) @ frame.rotation)
     tracker = identify(robot, measure(twin, robot.random_configurations(50, rng), 2e-5, rng), ELASTIC)
     away = np.linalg.norm(from_fixture.position - [0.15, 0.087, 0.245], axis=1) > 0.25
     by_tracker = np.linalg.norm(errors_of(tracker.robot, seen).position_errors[away], axis=1)
-    by_device = np.linalg.norm(errors_of(done.final.robot, from_fixture).position_errors[away], axis=1)
+    by_device = np.linalg.norm(errors_of(measured.final.robot, from_fixture).position_errors[away], axis=1)
     nominal = np.linalg.norm(errors_of(robot, seen).position_errors, axis=1)
     assert by_tracker.mean() < by_device.mean() < nominal.mean() / 3
     # the frame by the readings at the cups, as the document finds it
-    touched = done.frame_by(done.final.robot, "1").frame
+    touched = measured.frame_by(measured.final.robot, "1").frame
     assert touched.translation == pytest.approx([0, 0, 0], abs=5e-4)  # the fit's world is the fixture's frame
 
 
@@ -257,8 +257,8 @@ def test_more_places_tell_more(arm: Arm) -> None:
     twin = Twin(true.robot, {n: JointTruth(compliance=t.compliance) for n, t in true.joints.items()})
     frames, data = at_places(twin, (14, 30, 30), 1e-4)
     unseen = measure(twin, robot.random_configurations(60, np.random.default_rng(9)), 0.0, np.random.default_rng(0))
-    there = (unseen.position - np.array(frames[0].translation)) @ frames[0].rotation
-    unseen = replace(unseen, position=there)
+    in_first = (unseen.position - np.array(frames[0].translation)) @ frames[0].rotation
+    unseen = replace(unseen, position=in_first)
     left = []
     for places in (data[:1], data):
         fit = identify_placements(robot, places, ELASTIC)
@@ -270,5 +270,5 @@ def test_more_places_tell_more(arm: Arm) -> None:
         for frame, part in zip(frames, data, strict=True)
     ]
     best = identify(robot, reduce(joined, world), ELASTIC)
-    back = replace(unseen, position=there @ frames[0].rotation.T + np.array(frames[0].translation))
+    back = replace(unseen, position=in_first @ frames[0].rotation.T + np.array(frames[0].translation))
     assert left[1] < 2.0 * errors_of(best.robot, back).position_norms.mean()

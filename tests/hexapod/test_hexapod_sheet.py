@@ -40,15 +40,15 @@ Rows = list[dict[str, str]]
 @pytest.fixture
 def three() -> Rows:
     """Three poses with their lengths, the fixtures' distances in the first row only."""
-    found = poses()
+    all_poses = poses()
     base = triangle([0.3] * 3, "B")
     bar = ballbar(np.random.default_rng(0))
     rows, lengths = [], []
     for label, number in (("a", 5), ("b", 40), ("c", 66)):
-        pose = found[number - 1]
+        pose = all_poses[number - 1]
         rows.append(PlannedRow(label, "front-up-flip", number, pose.design, pose.solution, np.full(6, 0.1)))
         lengths.append(measured_legs(bar, pose.design, base, pose.cups))
-    lengths[0] |= measured_sides(bar, base, "B") | measured_sides(bar, found[0].cups, "T")
+    lengths[0] |= measured_sides(bar, base, "B") | measured_sides(bar, all_poses[0].cups, "T")
     return list(csv.DictReader(io.StringIO(sheet_csv(rows, JOINTS, lengths))))
 
 
@@ -235,10 +235,10 @@ def read(folder: Path, rows: Rows, name: str = "sheet.csv") -> Sheet:
 
 def test_all_sides_are_in_the_frame_of_the_first(tmp_path: Path, filled: Rows, base: Array) -> None:
     first = side_frames(base)[0]
-    found = read(tmp_path, filled).cups()
+    cups = read(tmp_path, filled).cups()
     for row, (_, pose, _, side, _) in enumerate(SAID):
         true = (_cups(base, pose, side) - np.array(first.translation)) @ first.rotation
-        assert found[row] == pytest.approx(true, abs=1e-9)
+        assert cups[row] == pytest.approx(true, abs=1e-9)
 
 
 def test_each_side_has_its_own_distances_and_names() -> None:
@@ -335,9 +335,9 @@ def test_an_attachment_is_needed_only_where_something_was_measured(tmp_path: Pat
 def test_sheets_that_do_not_fit(
     tmp_path: Path, filled: Rows, words: str, cure: str, change: Callable[[Rows], Rows]
 ) -> None:
-    one, other = read(tmp_path, filled, "one.csv"), read(tmp_path, change(_with_tool(filled)[:1]), "two.csv")
+    first, second = read(tmp_path, filled, "one.csv"), read(tmp_path, change(_with_tool(filled)[:1]), "two.csv")
     with pytest.raises(InputError, match=words) as refused:
-        together([one, other])
+        together([first, second])
     assert cure in str(refused.value)
 
 
@@ -350,7 +350,7 @@ def _without(row: dict[str, str], begin: str) -> dict[str, str]:
 
 
 def _attached(
-    rng: np.random.Generator, shift: float, turn: float, rest: float, attachments: int
+    rng: np.random.Generator, shift: float, turn: float, repeatability: float, attachments: int
 ) -> tuple[Array, Array]:
     """Return cups ``(configurations * attachments, 3, 3)`` in a world, and joint positions that tell configurations."""
     seen, joints = [], []
@@ -361,48 +361,48 @@ def _attached(
     for configuration in range(4):
         q, _ = np.linalg.qr(rng.standard_normal((3, 3)))
         for cups in moved:
-            seen.append(cups @ q.T + rest * rng.standard_normal((3, 3)))
+            seen.append(cups @ q.T + repeatability * rng.standard_normal((3, 3)))
             joints.append(np.full(6, 0.1 * configuration))
     return np.array(seen), np.array(joints)
 
 
 def test_the_changer_is_told_from_the_robot() -> None:
     rng = np.random.default_rng(3)
-    found, rest = [], []
+    of_changer, of_robot = [], []
     for _ in range(60):
         cups, joints = _attached(rng, 2e-5, 2e-4, 1e-5, 4)
-        seen = compared(cups, joints, [""] * 16, ["1", "2", "3", "4"] * 4).found
+        seen = compared(cups, joints, [""] * 16, ["1", "2", "3", "4"] * 4).repeatability
         assert seen is not None
         assert seen.rest is not None
         assert (seen.pairs, seen.compared) == (24, 4)
-        found.append(seen.changer**2)
-        rest.append(seen.rest**2)
+        of_changer.append(seen.changer**2)
+        of_robot.append(seen.rest**2)
     true = np.sqrt(4e-10 + 4e-8 * 2 / 3 * (CUPS**2).sum(axis=1))
-    assert np.sqrt(np.mean(found, axis=0)) == pytest.approx(true, rel=0.15)
-    assert np.sqrt(np.mean(rest, axis=0)) == pytest.approx(np.full(3, 1e-5), rel=0.1)
+    assert np.sqrt(np.mean(of_changer, axis=0)) == pytest.approx(true, rel=0.15)
+    assert np.sqrt(np.mean(of_robot, axis=0)) == pytest.approx(np.full(3, 1e-5), rel=0.1)
 
 
 def test_an_attachment_counts_as_it_differs_from_the_mean_of_all_rows() -> None:
     """The place of the tool is found from all rows, so what all rows share is no error."""
     rng = np.random.default_rng(5)
-    found = ChangerRepeatability(np.full(3, 2e-5), np.full(3, 1e-6), np.zeros(3), np.zeros(3), 1, 2)
-    assert found.declared(["1"] * 4) == pytest.approx(np.full((4, 3), 1e-6))
+    repeatability = ChangerRepeatability(np.full(3, 2e-5), np.full(3, 1e-6), np.zeros(3), np.zeros(3), 1, 2)
+    assert repeatability.declared(["1"] * 4) == pytest.approx(np.full((4, 3), 1e-6))
     names = ["1", "1", "1", "1", "1", "1", "2", "3"]
     moved = 2e-5 * rng.standard_normal((20000, 3))[:, np.array([int(name) - 1 for name in names])]
     moved = moved - moved.mean(axis=1, keepdims=True) + 1e-6 * rng.standard_normal(moved.shape)
-    assert found.declared(names)[:, 0] == pytest.approx(moved.std(axis=0), rel=0.03)
+    assert repeatability.declared(names)[:, 0] == pytest.approx(moved.std(axis=0), rel=0.03)
 
 
 def test_one_configuration_cannot_tell_the_robot_from_the_changer() -> None:
     cups, joints = _attached(np.random.default_rng(4), 2e-5, 0.0, 0.0, 2)
-    seen = compared(cups[:2], joints[:2], ["", ""], ["1", "2"]).found
+    seen = compared(cups[:2], joints[:2], ["", ""], ["1", "2"]).repeatability
     assert seen is not None
     assert seen.rest is None
     assert seen.changer == pytest.approx(np.linalg.norm(cups[1] - cups[0], axis=1) / np.sqrt(6))
     assert seen.declared(["1", "2", "2"]) == pytest.approx(np.tile(seen.changer, (3, 1)))
     # at another place, or at other joint positions, nothing was measured again
-    assert compared(cups[:2], joints[:2], ["left", "right"], ["1", "2"]).found is None
-    assert compared(cups[:2], joints[[0, -1]], ["", ""], ["1", "2"]).found is None
+    assert compared(cups[:2], joints[:2], ["left", "right"], ["1", "2"]).repeatability is None
+    assert compared(cups[:2], joints[[0, -1]], ["", ""], ["1", "2"]).repeatability is None
 
 
 def test_what_the_changer_does_not_repeat_is_declared(tmp_path: Path, filled: Rows) -> None:
@@ -412,11 +412,11 @@ def test_what_the_changer_does_not_repeat_is_declared(tmp_path: Path, filled: Ro
     sheet = together([read(tmp_path, [*filled[:2], again, *filled[2:]])])
     attached = sheet.attached()
     assert attached is not None
-    assert attached.found is not None
+    assert attached.repeatability is not None
     sigma = sheet.dataset().sigma
     assert sigma is not None
-    assert attached.found.rest is None
-    assert sigma[:3] == pytest.approx(np.maximum(attached.found.changer, CUP_DEVIATION * DEVICE.sigma))
+    assert attached.repeatability.rest is None
+    assert sigma[:3] == pytest.approx(np.maximum(attached.repeatability.changer, CUP_DEVIATION * DEVICE.sigma))
     assert sigma.max() > 1e-5
     # without anything measured again nothing is known, and nothing declared
     assert together([read(tmp_path, filled)]).dataset().sigma is None

@@ -118,7 +118,7 @@ def test_targets_that_nobody_knows(truearm: Truearm, small: Path, table: list[st
     truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path)
     data = written(tmp_path / "new.csv", with_cell(table, 4, "target", "9"))
     message = refused(truearm, "validate", tmp_path / "calibrated.yaml", data)
-    assert "irb120: the robot has no target of this name; got '9'; allowed: 1, 2, 3" in message
+    assert "new.csv: the robot has no target of this name; got '9'; allowed: 1, 2, 3" in message
     data = written(tmp_path / "data.csv", with_cell(table, 2, "target", "nine"))
     for seed in range(20):  # until it is in the held-out part
         run = truearm("calibrate", "irb120", data, "--train", "20", "--seed", seed, "--out", tmp_path / "out")

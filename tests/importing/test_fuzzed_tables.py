@@ -14,7 +14,7 @@ from tests.fuzz.mutations import ODD
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.units import as_number
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.data.readers.table import read_table
+from truearm.engine.data.readers.table import read_noting
 from truearm.importing.guess import guess_mapping
 
 #: How many tables; 2000 once in a while.
@@ -97,15 +97,15 @@ def drawn(rng: np.random.Generator) -> Table:
     return Table(written(sound), written(odd), mapping, row, column, len(above) + 2 + row, text)
 
 
-def same_elsewhere(one: Dataset, other: Dataset, row: int) -> bool:
-    kept = np.arange(len(one.target)) != row
+def same_elsewhere(first: Dataset, second: Dataset, row: int) -> bool:
+    elsewhere = np.arange(len(first.target)) != row
     return all(
-        np.array_equal(a[kept], b[kept], equal_nan=True)
+        np.array_equal(a[elsewhere], b[elsewhere], equal_nan=True)
         for a, b in (
-            (one.position, other.position),
-            (one.joints, other.joints),
-            (np.asarray(one.sigma), np.asarray(other.sigma)),
-            (np.asarray(one.temperature), np.asarray(other.temperature)),
+            (first.position, second.position),
+            (first.joints, second.joints),
+            (np.asarray(first.sigma), np.asarray(second.sigma)),
+            (np.asarray(first.temperature), np.asarray(second.temperature)),
         )
     )
 
@@ -116,19 +116,19 @@ def finding(case: int, folder: Path) -> str:
     file, mapping = folder / "table.csv", folder / "map.yaml"
     mapping.write_text(table.mapping)
     file.write_text(table.sound)
-    sound = read_table(file, mapping)
+    sound = read_noting(file, mapping)[0]
     file.write_bytes(table.odd.encode("utf-8", "surrogateescape"))
     structure = any(sign in table.text for sign in (*SIGNS.values(), '"', "\n", "\r", "//"))
     try:
-        data = read_table(file, mapping)
+        data = read_noting(file, mapping)[0]
     except InputError as error:
         place = f"line {table.line}"
         cell = f"{place}, column {NAMES[table.column]}"
-        told = str(error)
+        message = str(error)
         if structure:
-            return "" if "line " in told or "quotes" in told else told
-        overlaps = NAMES[table.column] == "When" and "column When" in told  # the other of two that coincide
-        return "" if cell in told or overlaps else f"{table.text!r} in {cell}: {told}"
+            return "" if "line " in message or "quotes" in message else message
+        overlaps = NAMES[table.column] == "When" and "column When" in message  # the other of two that coincide
+        return "" if cell in message or overlaps else f"{table.text!r} in {cell}: {message}"
     if structure:
         return ""
     number = as_number(table.text.replace(",", ".") if "decimal: comma" in table.mapping else table.text)
@@ -139,8 +139,8 @@ def finding(case: int, folder: Path) -> str:
 
 
 def test_odd_cells_are_refused_by_their_place(tmp_path: Path) -> None:
-    found = [f"{case}: {words}" for case in range(COUNT) if (words := finding(case, tmp_path))]
-    assert not found, "\n".join(found[:20])
+    findings = [f"{case}: {words}" for case in range(COUNT) if (words := finding(case, tmp_path))]
+    assert not findings, "\n".join(findings[:20])
 
 
 def test_a_guess_of_a_damaged_table_is_a_guess_or_a_refusal(tmp_path: Path) -> None:
@@ -168,4 +168,4 @@ def test_odd_cells_of_a_workbook_are_refused_by_their_place(tmp_path: Path, plac
         book.active[place] = text
         book.save(tmp_path / "table.xlsx")
         with pytest.raises(InputError, match=f"Points!{place}: "):
-            read_table(tmp_path / "table.xlsx", tmp_path / "map.yaml")
+            read_noting(tmp_path / "table.xlsx", tmp_path / "map.yaml")

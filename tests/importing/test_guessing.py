@@ -25,10 +25,10 @@ P003;22,7;790,6644;1702,5519;-640,2207;0,25;0,5;0,75
 
 def guessed(folder: Path, text: str, *, encoding: str = "utf-8") -> str:
     (folder / "table.csv").write_bytes(text.encode(encoding))
-    made = truearm.import_guess(folder / "table.csv")
-    for line in made.text.splitlines():
+    guess = truearm.import_guess(folder / "table.csv")
+    for line in guess.text.splitlines():
         assert "# guess: " in line or line.startswith(("#", "truearm:", "confirmed: no")) or line.endswith(":"), line
-    return made.text
+    return guess.text
 
 
 def test_a_newcomer_comes_in_at_the_first_try(tmp_path: Path) -> None:
@@ -155,9 +155,9 @@ def test_what_is_guessed(tmp_path: Path, table: str, lines: list[str]) -> None:
 def test_what_nothing_tells_is_asked(tmp_path: Path) -> None:
     table = "p,q1,q2,X,Y,Z,Rx,Ry,Rz\na,0.1,0.2,1.1,0.2,0.3,1,0,0\nb,0.1,0.3,1.1,0.2,0.3,1,0,0\n"
     (tmp_path / "table.csv").write_text(table)
-    made = truearm.import_guess(tmp_path / "table.csv", out=tmp_path / "map.yaml")
-    assert made.guessed.open == ("length_unit", "readings.angles", "joints.unit")
-    assert made.lines() == [
+    guess = truearm.import_guess(tmp_path / "table.csv", out=tmp_path / "map.yaml")
+    assert guess.guessed.open == ("length_unit", "readings.angles", "joints.unit")
+    assert guess.lines() == [
         f"Guessed 12 entries: {tmp_path / 'map.yaml'}",
         "Nothing in the file tells length_unit, readings.angles, joints.unit: answer each '?'.",
         "Nothing is imported before every guess is confirmed: look at each, then write confirmed: yes.",
@@ -175,13 +175,13 @@ def test_many_small_angles_are_radians(tmp_path: Path) -> None:
 
 def test_an_import_with_it_is_tried(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("p,J1,J2,X,Y,Z\na,100,2,800,2,3\nb,90,2,801,2,3\n")
-    made = truearm.import_guess(tmp_path / "a.csv")
-    assert made.lines()[1] == "An import with it would read 2 configurations, targets tip."
-    assert made.summary()["configurations"] == 2
+    guess = truearm.import_guess(tmp_path / "a.csv")
+    assert guess.lines()[1] == "An import with it would read 2 configurations, targets tip."
+    assert guess.summary()["configurations"] == 2
     (tmp_path / "a.csv").write_text("p,J1,J2,X,Y,Z\na,100,2,800,2,3\na,90,2,801,2,3\nb,n/a,2,801,2,3\n")
-    made = truearm.import_guess(tmp_path / "a.csv")
-    assert made.guessed.refusal is not None
-    assert "a.csv, line 4, column J1: a number belongs here; got 'n/a'" in made.lines()[1]
+    guess = truearm.import_guess(tmp_path / "a.csv")
+    assert guess.guessed.refusal is not None
+    assert "a.csv, line 4, column J1: a number belongs here; got 'n/a'" in guess.lines()[1]
     (tmp_path / "a.csv").write_text("p,X,Y,Z\na,800,2,3\nb,801,2,3\n")
     assert "No columns are called like joint positions: name" in truearm.import_guess(tmp_path / "a.csv").lines()[1]
 
@@ -216,7 +216,7 @@ def test_a_workbook_is_guessed_from_its_sheet_of_numbers(tmp_path: Path) -> None
     for row in (["Pose", "J1", "J2", "X", "Y", "Z"], ["P1", 90, 2, 800.5, 2, 3], ["P2", 91, 2, None, None, None]):
         sheet.append(row)
     book.save(tmp_path / "cell.xlsx")
-    made = truearm.import_guess(tmp_path / "cell.xlsx")
-    assert "sheet: Points  # guess: it has the most numbers of 2 sheets" in made.text
-    assert "header: 2" in made.text
-    assert made.lines()[1] == "An import with it would read 2 configurations, targets tip."
+    guess = truearm.import_guess(tmp_path / "cell.xlsx")
+    assert "sheet: Points  # guess: it has the most numbers of 2 sheets" in guess.text
+    assert "header: 2" in guess.text
+    assert guess.lines()[1] == "An import with it would read 2 configurations, targets tip."

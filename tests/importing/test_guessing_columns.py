@@ -44,8 +44,8 @@ def test_a_column_that_is_no_length_is_no_deviation(tmp_path: Path, name: str) -
     ],
 )
 def test_a_deviation_keeps_its_unit(tmp_path: Path, name: str, cells: str, entry: str) -> None:
-    found = [line for line in guessed(tmp_path, name, cells.split()).splitlines() if "sigma:" in line]
-    assert [entry in line for line in found] == [True] * bool(entry)
+    lines = [line for line in guessed(tmp_path, name, cells.split()).splitlines() if "sigma:" in line]
+    assert [entry in line for line in lines] == [True] * bool(entry)
 
 
 def test_numbers_of_an_orientation_are_a_quaternion_or_asked_for(tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_times_that_tell_the_order(tmp_path: Path) -> None:
 
 
 def test_a_sheet_that_cannot_be_read_is_refused_whatever_other_sheets_there_are(tmp_path: Path) -> None:
-    for rows, other, cells, said in (
+    for rows, other, cells, words in (
         (10, None, "A5:A6", "Data!A5: these cells are merged; got 'A5:A6'"),
         (18, None, "", "Data!D9: the formula has no value in the file"),
         (19, 4, "A5:A6", "these cells are merged"),
@@ -100,7 +100,7 @@ def test_a_sheet_that_cannot_be_read_is_refused_whatever_other_sheets_there_are(
         else:
             sheet["D9"] = "=1000*0.1"
         book.save(tmp_path / "cell.xlsx")
-        with pytest.raises(InputError, match=re.escape(said)):
+        with pytest.raises(InputError, match=re.escape(words)):
             guess_mapping(tmp_path / "cell.xlsx")
 
 
@@ -132,9 +132,9 @@ def test_what_was_measured_comes_before_what_is_shown(tmp_path: Path) -> None:
 def wide(folder: Path, text: str) -> str:
     """Return what is guessed of a table."""
     (folder / "table.txt").write_text(text)
-    made = truearm.import_guess(folder / "table.txt").guessed
-    assert made.refusal is None
-    return made.text
+    guess = truearm.import_guess(folder / "table.txt").guessed
+    assert guess.refusal is None
+    return guess.text
 
 
 @pytest.mark.parametrize("number", ["-999", "0", "-999.000"])
@@ -209,11 +209,11 @@ def test_a_change_of_form_far_below_is_found(tmp_path: Path) -> None:
     rows[5000] = rows[5000].replace(",", ".")
     rows[5100] += ";7"
     (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
-    made = guess_mapping(tmp_path / "table.csv")
-    assert "# Note: line 5101 has 7 cells where others have 6." in made.text
-    assert "# Note: line 5001, column J1: '50.5' is no number as others are written." in made.text
-    assert made.refusal is not None
-    assert "line 5101" in made.refusal or "line 5001" in made.refusal
+    guess = guess_mapping(tmp_path / "table.csv")
+    assert "# Note: line 5101 has 7 cells where others have 6." in guess.text
+    assert "# Note: line 5001, column J1: '50.5' is no number as others are written." in guess.text
+    assert guess.refusal is not None
+    assert "line 5101" in guess.refusal or "line 5001" in guess.refusal
 
 
 def test_a_guess_says_if_it_has_not_seen_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,11 +229,11 @@ def test_deviations_are_named_like_the_angles_beside_them(tmp_path: Path) -> Non
     rows = [f"M{n};{100 + n};2{n};80{n};2,5;3{n};0,1;0,2;0,{n};0,1;0,1;0,3" for n in (1, 2)]
     rows.append("M3;103;23" + ";n.v." * 6 + ";" * 3)
     (tmp_path / "table.csv").write_text("\n".join([head, *rows]) + "\n")
-    made = guess_mapping(tmp_path / "table.csv")
-    assert 'sigma_rot: {columns: ["sA [mrad]", "sB [mrad]", "sC [mrad]"], unit: mrad}' in made.text
-    assert 'missing: ["n.v."]' in made.text
-    assert made.refusal is None
-    assert made.configurations == 3
+    guess = guess_mapping(tmp_path / "table.csv")
+    assert 'sigma_rot: {columns: ["sA [mrad]", "sB [mrad]", "sC [mrad]"], unit: mrad}' in guess.text
+    assert 'missing: ["n.v."]' in guess.text
+    assert guess.refusal is None
+    assert guess.configurations == 3
 
 
 @pytest.mark.parametrize("letter", ["p", "t", "T"])
@@ -245,9 +245,9 @@ def test_positions_of_one_letter_are_known_where_nothing_else_is_one(tmp_path: P
     assert f"    x: {letter}x  # guess: its name" in guess_mapping(tmp_path / "table.csv").text
     beside = f"id,J1,J2,X,Y,Z,{names}\n" + "".join(f"{n},{100 + n},2,80{n},2.5,3,100,0,{n}\n" for n in (1, 2))
     (tmp_path / "table.csv").write_text(beside)
-    made = guess_mapping(tmp_path / "table.csv")
-    assert "    x: X  # guess: its name" in made.text
-    assert f"# Not used: {letter}x" in made.text
+    guess = guess_mapping(tmp_path / "table.csv")
+    assert "    x: X  # guess: its name" in guess.text
+    assert f"# Not used: {letter}x" in guess.text
 
 
 def timed(folder: Path, heading: str, cells: list[str]) -> str:
@@ -272,8 +272,8 @@ def timed(folder: Path, heading: str, cells: list[str]) -> str:
 def test_formats_of_times(tmp_path: Path, times: list[str], way: str) -> None:
     text = timed(tmp_path, "Time", times)
     assert f"order: {{column: Time, time: {way}}}" in text
-    made = truearm.import_guess(tmp_path / "table.csv").guessed
-    assert (made.refusal, made.configurations) == (None, 2)
+    guess = truearm.import_guess(tmp_path / "table.csv").guessed
+    assert (guess.refusal, guess.configurations) == (None, 2)
 
 
 @pytest.mark.parametrize(
@@ -304,10 +304,10 @@ def test_days_of_a_workbook_and_its_times_are_taken_together(tmp_path: Path) -> 
     for n, day in ((1, 24), (2, 23)):
         sheet.append([f"P{n}", date(2026, 11, day), time(10, n, 5), 10.5 * n, -20 - n, 1000.5, 2 * n, 3])
     book.save(tmp_path / "table.xlsx")
-    made = truearm.import_guess(tmp_path / "table.xlsx")
-    assert "order: {columns: [Day, Clock], time: iso}" in made.text
+    guess = truearm.import_guess(tmp_path / "table.xlsx")
+    assert "order: {columns: [Day, Clock], time: iso}" in guess.text
     mapping = tmp_path / "map.yaml"
-    mapping.write_text(made.text.replace("confirmed: no", "confirmed: yes").replace("unit: '?'", "unit: deg"))
+    mapping.write_text(guess.text.replace("confirmed: no", "confirmed: yes").replace("unit: '?'", "unit: deg"))
     data = truearm.import_table(tmp_path / "table.xlsx", mapping).data
     assert data.number is not None
     assert data.number.tolist() == [1, 0]

@@ -29,9 +29,9 @@ def test_sockets(truearm: Truearm, tmp_path: Path) -> None:
 def test_hand_eye(truearm: Truearm, tmp_path: Path) -> None:
     file, out = EXAMPLES["import_hand_eye"](tmp_path)["file"], tmp_path / "data.csv"
     words = ("import", "hand-eye", file, "--on-flange", "camera", "--out", out)
-    made = json.loads(truearm(*words, "--scale-sigma", "200", "--json").out)
-    assert (made["configurations"], made["on_flange"], made["scale_sigma_ppm"]) == (2, "camera", 200.0)
-    assert made["ahead_mm"] == pytest.approx(425.0)
+    summary = json.loads(truearm(*words, "--scale-sigma", "200", "--json").out)
+    assert (summary["configurations"], summary["on_flange"], summary["scale_sigma_ppm"]) == (2, "camera", 200.0)
+    assert summary["ahead_mm"] == pytest.approx(425.0)
     assert "the board's size is known to 200 ppm" in truearm(*words, "--scale-sigma", "200").out
     assert out.read_text().splitlines()[0].endswith("sigma [mm],sigma_rot [mrad],scale_sigma [ppm]")
     named = truearm(*words, "--board", "14x10,25mm,18mm,5X5_250")
@@ -41,8 +41,8 @@ def test_hand_eye(truearm: Truearm, tmp_path: Path) -> None:
 def test_a_guess_is_confirmed_and_imported(truearm: Truearm, tmp_path: Path) -> None:
     file, mapping, out = tmp_path / "cell.csv", tmp_path / "cell.yaml", tmp_path / "data.csv"
     file.write_text("Pose;J1;J2;X;Y;Z\nP001;10,5;20;800,5;2;3\nP002;11;21;n/a;n/a;n/a\n")
-    made = truearm("import", "guess", file, "--out", mapping)
-    assert (made.code, made.out.splitlines()[1]) == (0, "An import with it would read 2 configurations, targets tip.")
+    run = truearm("import", "guess", file, "--out", mapping)
+    assert (run.code, run.out.splitlines()[1]) == (0, "An import with it would read 2 configurations, targets tip.")
     assert json.loads(truearm("import", "guess", file, "--out", tmp_path / "b.yaml", "--json").out)["open"] == []
     refused = truearm("import", "table", file, "--map", mapping, "--out", out)
     assert (refused.code, "cell.yaml, confirmed: " in refused.err) == (2, True)
@@ -60,8 +60,8 @@ def test_presets_and_another_file_of_joints(truearm: Truearm, tmp_path: Path) ->
     points.write_text("A, P1, ball, 1, 2, 3, 0.1, 0.1, 0.1, 01/31/2026 10:00:00\n")
     joints.write_text("configuration,joint_1 [deg]\nP1,10\n")
     words = ("import", "table", points, "--map", "spatial-analyzer", "--out", out)
-    made = truearm(*words, "--joints-file", joints)
-    assert (made.code, made.out) == (0, f"1 configuration, targets ball: {out}\n")
+    run = truearm(*words, "--joints-file", joints)
+    assert (run.code, run.out) == (0, f"1 configuration, targets ball: {out}\n")
     missing = truearm(*words)
     assert (missing.code, "joints.csv: there is no such file" in missing.err) == (2, True)
     typo = truearm("import", "table", points, "--map", "spatial-analyser", "--out", out)
@@ -118,9 +118,9 @@ def touches(folder: Path, text: str = ROWS) -> Path:
 
 def test_joints_and_sockets_become_readings_at_two_points(tmp_path: Path) -> None:
     out = tmp_path / "data.csv"
-    made = package.import_sockets(touches(tmp_path), apart="200mm,0.02mm", ball="25mm", sigma=3e-5, out=out)
-    data = made.data
-    assert made.lines() == [f"3 configurations, targets ball: {out}"]
+    imported = package.import_sockets(touches(tmp_path), apart="200mm,0.02mm", ball="25mm", sigma=3e-5, out=out)
+    data = imported.data
+    assert imported.lines() == [f"3 configurations, targets ball: {out}"]
     assert data.fixtures == ("left", "right")
     assert data.against.tolist() == [0, 1, 0]
     assert not data.position.any()
@@ -138,10 +138,10 @@ def test_joints_and_sockets_become_readings_at_two_points(tmp_path: Path) -> Non
 
 
 def test_numbers_and_texts_mean_the_same(tmp_path: Path) -> None:
-    one = package.import_sockets(touches(tmp_path), apart=(0.2, 2e-5), ball=0.025).data
+    data = package.import_sockets(touches(tmp_path), apart=(0.2, 2e-5), ball=0.025).data
     other = package.import_sockets(touches(tmp_path), apart="20e-2 m, 20um", ball="25mm").data
-    assert csv_text(one) == csv_text(other)
-    assert one.sigma is None
+    assert csv_text(data) == csv_text(other)
+    assert data.sigma is None
 
 
 def test_joint_positions_of_the_controller_stay_the_controllers(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from tests.engine.data.test_table import LONG, MAP, read
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.readers.canonical import csv_text, read_csv
-from truearm.engine.data.readers.table import read_noting, read_table
+from truearm.engine.data.readers.table import read_noting
 from truearm.engine.robot.transform import quaternion_from_rotation, rotation_from_vector
 from truearm.importing.jobs import import_table
 
@@ -31,8 +31,8 @@ def about(axis: str, degrees: float) -> np.ndarray:
 
 def test_angles_of_every_order(tmp_path: Path) -> None:
     for order in (a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c):
-        one, two, three = (about(axis, value) for axis, value in zip(order, (20.0, -50.0, 110.0), strict=True))
-        for axes, wanted in (("moving", one @ two @ three), ("fixed", three @ two @ one)):
+        first, second, third = (about(axis, value) for axis, value in zip(order, (20.0, -50.0, 110.0), strict=True))
+        for axes, wanted in (("moving", first @ second @ third), ("fixed", third @ second @ first)):
             entry = f"angles: {{columns: [a, b, c], about: {order}, axes: {axes}, unit: deg}}"
             got = turned(tmp_path, "20,-50,110", entry)
             assert got == pytest.approx(quaternion_from_rotation(wanted), abs=1e-12), (order, axes)
@@ -60,9 +60,9 @@ def test_deviations_in_columns(tmp_path: Path) -> None:
     assert three.sigma is not None
     assert three.sigma[0] == pytest.approx(1e-5 * math.sqrt(14.0 / 3.0))
     assert np.isnan(three.sigma[1])
-    one = read(tmp_path, table, MAP.replace("z: Z", "z: Z, sigma: {columns: [U], unit: mm, coverage: 2}"))
-    assert one.sigma is not None
-    assert one.sigma[0] == pytest.approx(4e-5)
+    data = read(tmp_path, table, MAP.replace("z: Z", "z: Z, sigma: {columns: [U], unit: mm, coverage: 2}"))
+    assert data.sigma is not None
+    assert data.sigma[0] == pytest.approx(4e-5)
 
 
 def test_deviations_that_are_far_apart_are_told(tmp_path: Path) -> None:
@@ -74,15 +74,15 @@ def test_deviations_that_are_far_apart_are_told(tmp_path: Path) -> None:
     assert "3.5 times apart in half of the readings or more, and up to 4 times" in notice.message
     assert data.sigma is not None
     assert 3.0 * data.sigma[0] ** 2 == pytest.approx(1e-10 * (1 + 4 + 9))
-    told = import_table(tmp_path / "table.txt", tmp_path / "map.yaml")
-    assert told.lines()[-1].startswith("Note (sigma-uneven): ")
-    assert told.summary()["warnings"][0]["code"] == "sigma-uneven"
+    imported = import_table(tmp_path / "table.txt", tmp_path / "map.yaml")
+    assert imported.lines()[-1].startswith("Note (sigma-uneven): ")
+    assert imported.summary()["warnings"][0]["code"] == "sigma-uneven"
     (tmp_path / "table.txt").write_text(table.format("0.01").replace("0.04", "0.015"))
     assert not import_table(tmp_path / "table.txt", tmp_path / "map.yaml").warnings
 
 
 @pytest.mark.parametrize(
-    ("entry", "numbers", "told"),
+    ("entry", "numbers", "words"),
     [
         ("angles: {columns: [a, b, c], about: zyx, axes: moving, unit: rad}", "10,-35,170", "orientations (a, b, c)"),
         ("rotation_vector: {columns: [a, b, c], unit: rad}", "0.1,,-6.4", "orientations (a, b, c)"),
@@ -90,21 +90,21 @@ def test_deviations_that_are_far_apart_are_told(tmp_path: Path) -> None:
         ("angles: {columns: [a, b, c], about: zyx, axes: moving, unit: deg}", "10,-35,170", ""),
     ],
 )
-def test_degrees_that_are_read_as_radians_are_told(tmp_path: Path, entry: str, numbers: str, told: str) -> None:
+def test_degrees_that_are_read_as_radians_are_told(tmp_path: Path, entry: str, numbers: str, words: str) -> None:
     read(tmp_path, ROWS.format("0,1,0") + f"p,1,2,u,1,2,3,{numbers}\n", MAP.replace("z: Z", f"z: Z, {entry}"))
     notices = import_table(tmp_path / "table.txt", tmp_path / "map.yaml").warnings
-    assert [(notice.code, notice.level) for notice in notices] == [("radians-unlikely", "warning")] * bool(told)
-    assert all(told in notice.message and "in 1 of 2 rows" in notice.message for notice in notices)
+    assert [(notice.code, notice.level) for notice in notices] == [("radians-unlikely", "warning")] * bool(words)
+    assert all(words in notice.message and "in 1 of 2 rows" in notice.message for notice in notices)
 
 
 def test_joints_in_degrees_that_are_read_as_radians_are_told(tmp_path: Path) -> None:
     """A joint may turn on: one row of three beyond a full turn says nothing."""
     table = "pose,q1,q2,ball,X,Y,Z\n1,{},2,t,1,2,3\n2,{},1,t,1,2,3\n3,1,-1,t,1,2,3\n"
     mapping = MAP.replace("unit: deg", "unit: rad")
-    for first, second, told in ((30, -110, True), (30, 6, False)):
+    for first, second, warned in ((30, -110, True), (30, 6, False)):
         read(tmp_path, table.format(first, second), mapping)
         notices = import_table(tmp_path / "table.txt", tmp_path / "map.yaml").warnings
-        assert [notice.code for notice in notices] == ["radians-unlikely"] * told
+        assert [notice.code for notice in notices] == ["radians-unlikely"] * warned
         assert all("joints (q1, q2)" in n.message and "up to 110" in n.message for n in notices)
 
 
@@ -238,10 +238,10 @@ def test_joints_come_from_a_file_with_the_columns_of_the_canonical_csv(tmp_path:
     )
     other = tmp_path / "other.csv"
     other.write_text(joints.replace("axis", "joint"))
-    data = read_table(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)
+    data = read_noting(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)[0]
     assert data.joints_are == "model"
     with pytest.raises(InputError, match="the mapping says whose joint positions they are"):
-        read_table(tmp_path / "table.txt", tmp_path / "map.yaml", "controller", joints=other)
+        read_noting(tmp_path / "table.txt", tmp_path / "map.yaml", "controller", joints=other)
     with pytest.raises(InputError, match="the column configuration is missing"):
         read(tmp_path, LONG, mapping, joints.replace("configuration", "pose"))
     with pytest.raises(InputError, match=r"the configuration has no joints in .*column configuration"):
@@ -250,7 +250,7 @@ def test_joints_come_from_a_file_with_the_columns_of_the_canonical_csv(tmp_path:
         read(tmp_path, LONG.replace("a", "P001"), mapping, joints.replace("\na,", "\n1,"))
     (tmp_path / "map.yaml").write_text(MAP)
     with pytest.raises(InputError, match="takes the joint positions from the table itself") as refusal:
-        read_table(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)
+        read_noting(tmp_path / "table.txt", tmp_path / "map.yaml", joints=other)
     assert refusal.value.parameter == "joints_file"
 
 

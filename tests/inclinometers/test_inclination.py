@@ -32,9 +32,9 @@ def tilting_model(truth: Mapping[str, float] = TRUTH) -> Robot:
 @pytest.mark.parametrize("tilts", [False, True])
 def test_readings_are_the_twins(tilts: bool) -> None:
     """To rounding without tilts; the model's loads are those before the shafts tilt, which turns them a little."""
-    kept = {i: joint if tilts else replace(joint, clearance=0.0) for i, joint in JOINTS.items()}
-    twin, rng = replace(tilting_katana(), joints=kept), RNG(0)
-    robot = tilting_model({name: getattr(kept[int(name[-1])], name[:-2]) for name in TRUTH})
+    joints = {i: joint if tilts else replace(joint, clearance=0.0) for i, joint in JOINTS.items()}
+    twin, rng = replace(tilting_katana(), joints=joints), RNG(0)
+    robot = tilting_model({name: getattr(joints[int(name[-1])], name[:-2]) for name in TRUTH})
     q = robot.random_configurations(60, rng)
     wrench = np.pad(rng.normal(0.0, 20.0, (60, 3)), ((0, 0), (0, 3)))
     at = robot.loaded(Postures(q, wrench=wrench))
@@ -61,12 +61,12 @@ def test_derivatives_are_central_differences() -> None:
     names = [*TRUTH, *(p.name for p in robot.parameters.values() if p.group in ("joint zero", "geometry"))]
     at = robot.loaded(Postures(robot.random_configurations(20, rng)))
     seats = np.zeros((5, 3))
-    found = inclination_derivatives(robot, at, names, seats)
-    assert found.shape == (20, 5, 3, len(names) + 15)
+    derivatives = inclination_derivatives(robot, at, names, seats)
+    assert derivatives.shape == (20, 5, 3, len(names) + 15)
     usual = np.abs(inclinations_of(robot, at)) < 1.4
 
     def check(column: int, plus: Array, minus: Array) -> None:
-        assert_allclose(found[..., column][usual], ((plus - minus) / (2 * h))[usual], atol=3e-8, rtol=1e-6)
+        assert_allclose(derivatives[..., column][usual], ((plus - minus) / (2 * h))[usual], atol=3e-8, rtol=1e-6)
 
     for column, name in enumerate(names):
         value = robot.values[name]
@@ -79,7 +79,7 @@ def test_derivatives_are_central_differences() -> None:
             inclinations_of(robot, at, turn.reshape(5, 3)),
             inclinations_of(robot, at, -turn.reshape(5, 3)),
         )
-    assert np.isfinite(found).all()
+    assert np.isfinite(derivatives).all()
 
 
 def planar(payload: float) -> Robot:

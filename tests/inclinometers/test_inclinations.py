@@ -36,28 +36,28 @@ def read(folder: Path, text: str) -> object:
 
 def test_columns_become_angles_instruments_and_pairs(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(SOUND)
-    found = read_inclinations(tmp_path / "data.csv")
-    assert found.labels == ("a", "b", "c")
-    assert found.instruments.names == ("link 1", "link 2, sensor left", "link 2, sensor right")
-    assert found.instruments.links == (0, 1, 1)
-    assert_allclose(found.angle[0, :, 0], np.radians([1.0, -2.0, 3.0]))
-    assert_allclose(found.angle[0, 0, :2], [math.radians(1.0), 0.0175])
-    assert math.isnan(found.angle[0, 0, 2])
-    assert np.isnan(found.angle[1, 1:]).all()
-    assert_allclose(found.sigma[0], np.radians([0.001, 0.001, 0.002]))
-    assert found.payload.tolist() == [[0, 0, 0, 0], [1.5, 0, 0, 0], [0, 0, 0, 0]]
-    assert found.pairs.tolist() == [[0, 1]]
-    assert found.unpaired == ("c",)
+    inclinations = read_inclinations(tmp_path / "data.csv")
+    assert inclinations.labels == ("a", "b", "c")
+    assert inclinations.instruments.names == ("link 1", "link 2, sensor left", "link 2, sensor right")
+    assert inclinations.instruments.links == (0, 1, 1)
+    assert_allclose(inclinations.angle[0, :, 0], np.radians([1.0, -2.0, 3.0]))
+    assert_allclose(inclinations.angle[0, 0, :2], [math.radians(1.0), 0.0175])
+    assert math.isnan(inclinations.angle[0, 0, 2])
+    assert np.isnan(inclinations.angle[1, 1:]).all()
+    assert_allclose(inclinations.sigma[0], np.radians([0.001, 0.001, 0.002]))
+    assert inclinations.payload.tolist() == [[0, 0, 0, 0], [1.5, 0, 0, 0], [0, 0, 0, 0]]
+    assert inclinations.pairs.tolist() == [[0, 1]]
+    assert inclinations.unpaired == ("c",)
 
 
 def test_what_was_written_is_read_again(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(SOUND)
-    found = read_inclinations(tmp_path / "data.csv")
-    text = inclinations_text(found)
+    inclinations = read_inclinations(tmp_path / "data.csv")
+    text = inclinations_text(inclinations)
     (tmp_path / "again.csv").write_text(text)
     again = read_inclinations(tmp_path / "again.csv")
     assert inclinations_text(again) == text
-    assert_allclose(again.angle, found.angle)
+    assert_allclose(again.angle, inclinations.angle)
     assert again.order.tolist() == [3, 4, 9]
     forces = "force_x [N],force_y [N],force_z [N],moment_x [N m],moment_y [N m],moment_z [N m]"
     rows = "a,10,1,2,3,4,5,6,1,2,0.001\nb,10,0,0,0,0,0,0,1,2,0.001\n"
@@ -74,11 +74,11 @@ def test_a_payload_is_a_weight_at_the_flange(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(
         f"{head},payload_z [mm],link,x [deg],y [deg],sigma [deg]\n1,10,20,30,2,100,0,50,1,0,0,0.001\n"
     )
-    found = read_inclinations(tmp_path / "data.csv")
-    wrench = found.postures(robot).wrench
+    inclinations = read_inclinations(tmp_path / "data.csv")
+    wrench = inclinations.postures(robot).wrench
     assert wrench is not None
     assert_allclose(wrench[0, :3], [0.0, 0.0, -2 * 9.81], rtol=1e-3)
-    _, rotation = robot.with_frames(robot.base, {}).forward(found.joints[0])
+    _, rotation = robot.with_frames(robot.base, {}).forward(inclinations.joints[0])
     arm = robot.base.rotation.T @ rotation.reshape(3, 3) @ np.array([0.1, 0.0, 0.05])
     assert_allclose(wrench[0, 3:], np.cross(arm, wrench[0, :3]).reshape(3), atol=1e-9)
 
@@ -121,18 +121,18 @@ def test_refusals(tmp_path: Path, text: str, says: str) -> None:
 
 def test_objects_that_do_not_fit_together_are_refused(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(SOUND)
-    found = read_inclinations(tmp_path / "data.csv")
-    other = replace(found.instruments, links=(0, 1, 2))
-    bent: dict[str, tuple[dict[str, Any], str]] = {
-        "shape": ({"sigma": found.sigma[:, :2]}, "wrong number of values: sigma"),
-        "joints": ({"joints": found.joints * math.nan}, "joint position"),
-        "wrench": ({"wrench": found.wrench + math.inf}, "force or a moment"),
-        "payload": ({"payload": found.payload - 1.0}, "payload"),
-        "angle": ({"angle": found.angle + 2.0}, "beyond the vertical"),
-        "sigma": ({"sigma": 0.0 * found.sigma}, "deviation"),
-        "order": ({"order": 0 * found.order}, "same place"),
+    inclinations = read_inclinations(tmp_path / "data.csv")
+    other = replace(inclinations.instruments, links=(0, 1, 2))
+    wrong: dict[str, tuple[dict[str, Any], str]] = {
+        "shape": ({"sigma": inclinations.sigma[:, :2]}, "wrong number of values: sigma"),
+        "joints": ({"joints": inclinations.joints * math.nan}, "joint position"),
+        "wrench": ({"wrench": inclinations.wrench + math.inf}, "force or a moment"),
+        "payload": ({"payload": inclinations.payload - 1.0}, "payload"),
+        "angle": ({"angle": inclinations.angle + 2.0}, "beyond the vertical"),
+        "sigma": ({"sigma": 0.0 * inclinations.sigma}, "deviation"),
+        "order": ({"order": 0 * inclinations.order}, "same place"),
         "links": ({"instruments": other}, "no such link"),
     }
-    for change, says in bent.values():
+    for change, says in wrong.values():
         with pytest.raises(InputError, match=says):
-            replace(found, **change)
+            replace(inclinations, **change)

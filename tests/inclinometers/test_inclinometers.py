@@ -47,8 +47,8 @@ def first_stage() -> TiltingFit:
 
 def away(fit: TiltingFit, names: tuple[str, ...] = tuple(TRUTH)) -> np.ndarray:
     """Return how many deviations each constant is away from its truth."""
-    found = [fit.robot.parameters[name] for name in names]
-    return np.array([(p.value - TRUTH[p.name]) / (p.deviation or np.nan) for p in found])
+    constants = [fit.robot.parameters[name] for name in names]
+    return np.array([(p.value - TRUTH[p.name]) / (p.deviation or np.nan) for p in constants])
 
 
 def test_constants_come_back_within_their_deviations() -> None:
@@ -115,8 +115,12 @@ def test_missing_readings_cost_certainty_only() -> None:
 def test_believed_constants_are_priors() -> None:
     fit = first_stage()
     for name in fit.names:
-        found, believed = fit.robot.parameters[name], fit.with_priors.parameters[name]
-        assert (believed.nominal, believed.value, believed.prior) == (found.value, found.value, found.deviation)
+        identified, believed = fit.robot.parameters[name], fit.with_priors.parameters[name]
+        assert (believed.nominal, believed.value, believed.prior) == (
+            identified.value,
+            identified.value,
+            identified.deviation,
+        )
 
 
 def mean_error(robot: Robot, twin: Twin, seed: int) -> float:
@@ -148,14 +152,14 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="standard deviation"):
         replace(readings, sigma=0.0)
     unread = replace(readings, change=np.full_like(readings.change, np.nan))
-    for given, says in (
+    for arguments, says in (
         ((unread,), "no change of inclination"),
         ((readings, poses.of_configurations(range(15))), "not in pairs"),
         ((readings, poses.of_configurations([1, 2, 3, 4])), "not in pairs"),
         ((readings, replace(poses, sigma=None)), "declare no standard deviation"),
     ):
         with pytest.raises(InputError, match=says):
-            calibrate_tilting(KATANA, *given)
+            calibrate_tilting(KATANA, *arguments)
     q = KATANA.random_configurations(4, np.random.default_rng(0))
     unloaded = measure_pairs(twin, Pairs(Postures(q), Postures(q)), 1e-5, np.random.default_rng(0))
     with pytest.raises(InputError, match="no pair of poses"):

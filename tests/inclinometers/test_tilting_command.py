@@ -28,11 +28,11 @@ def test_both_stages_from_files_into_files(truearm: Truearm, campaign: Path, tmp
     files = campaign / "inclinations.csv", campaign / "poses.csv", "--pushed", campaign / "inclinations-pushed.csv"
     run = truearm("tilting", "katana450", *files, "--out", tmp_path, "--json")
     assert run.code == 0, run.err
-    told = json.loads(run.out)
+    summary = json.loads(run.out)
     keys = ["status", "warnings", "inclinations", "constants", "geometry", "geometry_alone"]
-    assert {*told} == {"simulated", "simulated_parts", *keys}
-    assert (told["inclinations"]["pairs"], told["inclinations"]["pushed"]) == (12, 16)
-    after, alone = (told[key]["validation"]["position_mm"]["mean"] for key in ("geometry", "geometry_alone"))
+    assert {*summary} == {"simulated", "simulated_parts", *keys}
+    assert (summary["inclinations"]["pairs"], summary["inclinations"]["pushed"]) == (12, 16)
+    after, alone = (summary[key]["validation"]["position_mm"]["mean"] for key in ("geometry", "geometry_alone"))
     assert after < 0.3 * alone
     assert json.loads(truearm("show", tmp_path / "calibrated.yaml", "--json").out)["name"] == "katana450"
     checked = truearm("validate", tmp_path / "calibrated.yaml", campaign / "poses.csv", "--json")
@@ -75,8 +75,8 @@ def test_files_of_something_else_are_refused(truearm: Truearm, campaign: Path, t
 def test_inclinometers_are_planned_and_simulated(truearm: Truearm, tmp_path: Path) -> None:
     out = tmp_path / "plan.csv"
     words = ("--device", "inclinometers", "--candidates", 100, "--noise", 0.01, "--out", out)
-    told = json.loads(truearm("plan", "katana450", "--poses", 8, *words, "--json").out)
-    assert (told["inclined"], told["posed"], told["unseen"]) == (8, 16, [])
+    summary = json.loads(truearm("plan", "katana450", "--poses", 8, *words, "--json").out)
+    assert (summary["inclined"], summary["posed"], summary["unseen"]) == (8, 16, [])
     with out.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["reads"] for row in rows] == ["inclinations"] * 8 + ["positions"] * 16
@@ -86,8 +86,8 @@ def test_inclinometers_are_planned_and_simulated(truearm: Truearm, tmp_path: Pat
     run = truearm("plan", "katana450", "--poses", 8, *words, "--pull", 0, "--details")
     assert "by gravity alone" in run.out
     assert "compliance_1   stays unknown" in run.out
-    made = tmp_path / "read.csv"
-    pulled = ("--truth", "tilting", "--device", "inclinometers", "--pull", 30, "--out", made)
+    table = tmp_path / "read.csv"
+    pulled = ("--truth", "tilting", "--device", "inclinometers", "--pull", 30, "--out", table)
     run = truearm("simulate", "katana450", "--poses", 8, *pulled)
     assert run.code == 0, run.err
     assert "80 angles of 5 inclinometers" in run.out
@@ -134,8 +134,8 @@ def test_influence_with_and_without_data(truearm: Truearm, campaign: Path, tmp_p
     assert "On 12 configurations that none of them has seen:" in run.out
     assert "influence-based, pose by pose" in run.out
     assert "Note (influence-worse)" in run.out
-    told = json.loads(truearm(*words[:3], "--json").out)
-    assert list(told["errors"]) == ["nominal", "minimum norm", "influence", "least squares", "calibrate"]
+    summary = json.loads(truearm(*words[:3], "--json").out)
+    assert list(summary["errors"]) == ["nominal", "minimum norm", "influence", "least squares", "calibrate"]
     assert {"influence.csv", "report.html", "result.json"} < {path.name for path in tmp_path.iterdir()}
     run = truearm("influence", "katana450", campaign / "poses.csv", "--poses", 3)
     assert (run.code, "--poses: the configurations are those of the readings" in run.err) == (2, True)

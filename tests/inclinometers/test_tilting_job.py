@@ -43,7 +43,7 @@ def measured() -> Dataset:
 
 
 @cache
-def found() -> Tilting:
+def tilting_result() -> Tilting:
     return truearm.tilting(KATANA, inclinations(), measured(), pushed=simulated().pushed)
 
 
@@ -52,7 +52,7 @@ def codes(result: Tilting) -> dict[str, str]:
 
 
 def test_constants_come_back_within_their_deviations() -> None:
-    result = found()
+    result = tilting_result()
     away = [
         (p.value - TRUTH[p.name]) / (p.deviation or 0.0)
         for p in (result.fit.robot.parameters[name] for name in result.fit.names)
@@ -92,9 +92,9 @@ def test_pushing_that_does_not_turn_the_upright_joint_is_told() -> None:
 def test_gravity_alone_leaves_tilts_open() -> None:
     result = truearm.tilting(KATANA, simulated(pull=0.0).inclinations)
     assert codes(result) == {"upright-unseen": "warning", "tilting-unseen": "warning"}
-    told = " ".join(notice.message for notice in result.notices)
+    messages = " ".join(notice.message for notice in result.notices)
     for name in ("backlash_1", "compliance_1", "clearance_3"):
-        assert name in told
+        assert name in messages
     assert result.fit.robot.values["backlash_2"] == pytest.approx(TRUTH["backlash_2"], abs=math.radians(1e-3))
 
 
@@ -108,10 +108,10 @@ def test_one_joint_only_says_what_it_does_not_tell() -> None:
         return angle
 
     result = truearm.tilting(KATANA, with_angles(of_link_3))
-    told = {notice.code: notice.message for notice in result.notices}
+    messages = {notice.code: notice.message for notice in result.notices}
     for name in ("backlash_4", "clearance_5", "clearance_2"):
-        assert name in told["tilting-unseen"]
-    assert "backlash_2" not in told["tilting-unseen"]
+        assert name in messages["tilting-unseen"]
+    assert "backlash_2" not in messages["tilting-unseen"]
     assert result.fit.robot.values["backlash_3"] == pytest.approx(TRUTH["backlash_3"], abs=math.radians(1e-3))
 
 
@@ -120,7 +120,7 @@ def test_zeros_of_instruments_and_relative_readings_change_nothing() -> None:
         relative = angle - np.radians(20.0) * np.array([1.0, -1.0, 0.0])
         return np.where(np.abs(relative) < math.pi / 2, relative, math.nan)
 
-    plain, other = found(), truearm.tilting(KATANA, with_angles(zeroed))
+    plain, other = tilting_result(), truearm.tilting(KATANA, with_angles(zeroed))
     assert other.seats()[1]["zero_deg"]["x"] == pytest.approx(-20.0, abs=1.0)
     for name in ("backlash_3", "clearance_4", "compliance_2"):
         p = plain.fit.robot.parameters[name]
@@ -193,12 +193,12 @@ def test_forces_of_the_wrong_sign_are_an_error() -> None:
     assert not result.finished
 
 
-def test_an_instrument_that_entry_errors_is_told() -> None:
-    def entry_errors(angle: Array) -> Array:
+def test_an_instrument_that_shifts_is_told() -> None:
+    def shifted(angle: Array) -> Array:
         angle[1::2, 2] += math.radians(0.002)
         return angle
 
-    result = truearm.tilting(KATANA, with_angles(entry_errors))
+    result = truearm.tilting(KATANA, with_angles(shifted))
     assert codes(result)["inclinations-scatter"] == "warning"
     assert "link 3" in next(n.message for n in result.notices if n.code == "inclinations-scatter")
 
@@ -208,7 +208,7 @@ def test_joints_that_hardly_tilt_are_better_left_alone() -> None:
     data = truearm.simulate(KATANA, truth="standard", poses=30, noise=1e-5).data
     result = truearm.tilting(KATANA, read, data)
     assert codes(result)["tilting-not-better"] == "warning"
-    assert "tilting-not-better" not in codes(found())
+    assert "tilting-not-better" not in codes(tilting_result())
 
 
 def test_configurations_without_a_partner_are_told() -> None:
@@ -223,13 +223,13 @@ def test_configurations_without_a_partner_are_told() -> None:
 def test_a_fit_that_does_not_converge_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     from truearm.inclinometers import tilting as job
 
-    def unsettled(*given: Any) -> TiltingFit:
+    def unsettled(*arguments: Any) -> TiltingFit:
         return replace(known, converged=False)
 
-    known = found().fit
+    known = tilting_result().fit
     monkeypatch.setattr(job, "calibrate_tilting", unsettled)
     result = truearm.tilting(KATANA, inclinations())
-    assert codes(result)["tilting-not-converged"] == "error"
+    assert codes(result)["not-converged"] == "error"
     assert result.summary()["status"] == "not-converged"
 
 
@@ -261,25 +261,25 @@ def test_refusals(options: dict[str, Any], parameter: str, says: str) -> None:
         "unpaired": pushed.of_configurations(range(1, 16)),
         "no sigma": replace(pushed, sigma=None),
     }
-    given: dict[str, Any] = {"robot": KATANA, "inclinations": inclinations()} | {
+    options_given: dict[str, Any] = {"robot": KATANA, "inclinations": inclinations()} | {
         n: known.get(v, v) for n, v in options.items()
     }
     with pytest.raises(InputError, match=says) as refusal:
-        truearm.tilting(**given)
+        truearm.tilting(**options_given)
     assert refusal.value.parameter == parameter
 
 
 def test_files_hold_both_stages(tmp_path: Path) -> None:
-    result = found()
+    result = tilting_result()
     written = result.save(tmp_path)
     names = ["calibrated.yaml", "result.json", "report.html", "calibrated.urdf", "geometry.html"]
     assert [path.name for path in written] == names
-    held = json.loads((tmp_path / "result.json").read_text())
-    assert held["truearm"] == "truearm-tilting/1"
-    assert [row["name"] for row in held["constants"][:3]] == ["clearance_1", "backlash_1", "compliance_1"]
+    content = json.loads((tmp_path / "result.json").read_text())
+    assert content["truearm"] == "truearm-tilting/1"
+    assert [row["name"] for row in content["constants"][:3]] == ["clearance_1", "backlash_1", "compliance_1"]
     assert (
-        held["geometry"]["validation"]["position_mm"]["mean"]
-        < 0.2 * (held["geometry_alone"]["validation"]["position_mm"]["mean"])
+        content["geometry"]["validation"]["position_mm"]["mean"]
+        < 0.2 * (content["geometry_alone"]["validation"]["position_mm"]["mean"])
     )
     again = truearm.load_robot(tmp_path / "calibrated.yaml")
     assert again.values == pytest.approx(result.robot.values)
@@ -306,12 +306,12 @@ def test_controllers_joints_are_the_models(tmp_path: Path) -> None:
     shown = truearm.simulate_inclinometers(robot, **options, joints="controller", out=tmp_path / "data.csv")
     assert "axis_3 [deg]" in inclinations_text(shown.inclinations)
     assert [file.name for file in shown.files] == ["data.csv", "data-pushed.csv"]
-    found = truearm.tilting(robot, tmp_path / "data.csv", payload="1kg,80mm,0mm,50mm")
-    assert found.changes.pairs.in_turn.joints == pytest.approx(model.joints, abs=1e-9)
+    result = truearm.tilting(robot, tmp_path / "data.csv", payload="1kg,80mm,0mm,50mm")
+    assert result.changes.pairs.in_turn.joints == pytest.approx(model.joints, abs=1e-9)
 
 
 def test_poses_that_were_not_seen_are_better_met_and_the_robot_keeps_the_constants() -> None:
-    result = found()
+    result = tilting_result()
     assert result.geometry is not None
     assert result.geometry_alone is not None
     after, alone = result.geometry.validation, result.geometry_alone.validation

@@ -31,34 +31,34 @@ def arguments_in(folder: Path, texts: Mapping[str, str]) -> Arguments:
     return {"plan": folder / PLAN, **read, "alignment": folder / "alignment.yaml"}
 
 
-def planned_in(folder: Path, plan: PerformancePlan, **how: Any) -> Arguments:
+def planned_in(folder: Path, plan: PerformancePlan, **options: Any) -> Arguments:
     """Write a plan and what the twin reads for it."""
-    given = arguments_in(folder, {PLAN: plan_text(plan), ROBOT: robot_text(plan.robot)})
-    truearm.iso9283_simulate("irb120", plan, seed=1, out=folder, **how)
-    return given
+    arguments = arguments_in(folder, {PLAN: plan_text(plan), ROBOT: robot_text(plan.robot)})
+    truearm.iso9283_simulate("irb120", plan, seed=1, out=folder, **options)
+    return arguments
 
 
-def evaluated(given: Arguments, *files: str, **more: Any) -> Iso9283Evaluation:
+def evaluated(arguments: Arguments, *files: str, **more: Any) -> Iso9283Evaluation:
     """Evaluate some files of a campaign, by its plan and its tie to the base."""
-    return truearm.iso9283_evaluate(**{name: given[name] for name in ("plan", "alignment", *files)}, **more)
+    return truearm.iso9283_evaluate(**{name: arguments[name] for name in ("plan", "alignment", *files)}, **more)
 
 
-def refusal_of(given: Arguments, *files: str, **more: Any) -> InputError:
+def refusal_of(arguments: Arguments, *files: str, **more: Any) -> InputError:
     with pytest.raises(InputError) as refusal:
-        evaluated(given, *(files or FILES), **more)
+        evaluated(arguments, *(files or FILES), **more)
     return refusal.value
 
 
-def notices(found: Iso9283Evaluation) -> dict[str, Notice]:
-    return {notice.code: notice for notice in found.warnings}
+def notices(result: Iso9283Evaluation) -> dict[str, Notice]:
+    return {notice.code: notice for notice in result.warnings}
 
 
 def each_row(path: Path, change: Callable[[Row], object]) -> Path:
     """Change every row of a file; one of which the change says False is left out."""
     rows = list(csv.DictReader(io.StringIO(path.read_text())))
-    kept = [row for row in rows if change(row) is not False]
+    remaining = [row for row in rows if change(row) is not False]
     with path.open("w", newline="") as stream:
         writer = csv.DictWriter(stream, rows[0], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(kept)
+        writer.writerows(remaining)
     return path

@@ -10,8 +10,8 @@ from truearm.engine.base.errors import Notice
 from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.alignment import Alignment
 from truearm.iso9283.criteria.paths import path_values
+from truearm.iso9283.evaluating.data_notices import stream_notices
 from truearm.iso9283.evaluating.evaluation import Evaluation
-from truearm.iso9283.evaluating.told import said_of_streams
 from truearm.iso9283.planning.criteria import PerformancePlan, Way
 from truearm.iso9283.planning.records import Samples
 
@@ -29,11 +29,11 @@ def runs(*, rate: float = 100.0, cycles: int = 5, sigma: float = 0.02e-3, shape:
     return samples_of("AT", shape, [(k + 1, t, p + rng.normal(0.0, sigma, p.shape)) for k in range(cycles)])
 
 
-def part(samples: Samples, kept: NDArray[np.bool_]) -> Samples:
+def part(samples: Samples, chosen: NDArray[np.bool_]) -> Samples:
     """Return some of the rows of one test at one place."""
     test, place = samples.criterion.names[0], samples.place.names[0]
-    rows = [(k, kept & (samples.cycle == k)) for k in sorted({*samples.cycle.tolist()})]
-    return samples_of(test, place, [(k, samples.time[here], samples.position[here]) for k, here in rows])
+    rows = [(k, chosen & (samples.cycle == k)) for k in sorted({*samples.cycle.tolist()})]
+    return samples_of(test, place, [(k, samples.time[of_cycle], samples.position[of_cycle]) for k, of_cycle in rows])
 
 
 def to_rest(
@@ -102,15 +102,15 @@ def cornering(
     return samples_of("CR", "rectangle", rows)
 
 
-def found(**parts: object) -> Evaluation:
+def evaluation_of(**parts: object) -> Evaluation:
     """Return an evaluation of which nothing is known but some parts."""
     return Evaluation((), Alignment.__new__(Alignment), **parts)  # type: ignore[arg-type]
 
 
-def said(**parts: object) -> dict[str, Notice]:
+def notices_of(**parts: object) -> dict[str, Notice]:
     """Return what is said of curves of some criteria, by its code."""
-    return {notice.code: notice for notice in said_of_streams(found(**parts))}
+    return {notice.code: notice for notice in stream_notices(evaluation_of(**parts))}
 
 
-def said_of_paths(samples: Samples) -> dict[str, Notice]:
-    return said(deviations=tuple(path_values(PLAN, samples, HERE, TRACKER)[1]))
+def notices_of_paths(samples: Samples) -> dict[str, Notice]:
+    return notices_of(deviations=tuple(path_values(PLAN, samples, HERE, TRACKER)[1]))

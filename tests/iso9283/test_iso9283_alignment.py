@@ -69,7 +69,7 @@ def measured_in(folder: Path) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "words"),
     [
         ({"position": "[1.5, -0.31, 0.012]"}, "Is the position in m where the file says mm?"),
         ({"units": "{length: m, angle: deg}", "sigma": "3e-5"}, "Is the position in mm where the file says m?"),
@@ -79,12 +79,12 @@ def measured_in(folder: Path) -> np.ndarray:
     ],
 )
 def test_a_tie_that_puts_the_readings_elsewhere_is_refused_with_its_likely_cause(
-    changes: dict[str, str], said: str, tmp_path: Path
+    changes: dict[str, str], words: str, tmp_path: Path
 ) -> None:
     measured = measured_in(tmp_path)
     refuse_implausible(read_alignment(written(tmp_path, **TURNED)), CUBE, measured, "tie.yaml")
     tie = read_alignment(written(tmp_path, **(TURNED | changes)))
     with pytest.raises(InputError, match="lies far from the cube of the tests") as refusal:
         refuse_implausible(tie, CUBE, measured, "tie.yaml")
-    assert said in str(refusal.value)
+    assert words in str(refusal.value)
     assert str(refusal.value).startswith("tie.yaml: ")

@@ -21,22 +21,22 @@ READ = ("poses", "paths")
 
 
 @pytest.fixture(scope="module")
-def given(tmp_path_factory: pytest.TempPathFactory) -> Arguments:
+def arguments(tmp_path_factory: pytest.TempPathFactory) -> Arguments:
     """Return the arguments of poses and paths that were measured, and a first result beside them."""
     folder = tmp_path_factory.mktemp("beside")
     plan = small_plan(["AP", "AT"], cycles={"AP": 5, "AT": 3}, velocities=(1.0, 0.5))
-    given = planned_in(folder, plan, rate=100.0)
-    evaluated(given, "poses", "paths", out=folder / "first")
-    return given | {"compare": folder / "first" / RESULT}
+    arguments = planned_in(folder, plan, rate=100.0)
+    evaluated(arguments, "poses", "paths", out=folder / "first")
+    return arguments | {"compare": folder / "first" / RESULT}
 
 
-def pictures(found: Iso9283Evaluation) -> dict[str, Section]:
-    inside = found.evaluation
+def pictures(result: Iso9283Evaluation) -> dict[str, Section]:
+    inside = result.evaluation
     drawn = [
-        *pose_pictures(found.plan, inside.clouds, inside.drift, inside.settling, inside.pushes, found.comparison),
-        *path_pictures(inside, found.comparison),
+        *pose_pictures(result.plan, inside.clouds, inside.drift, inside.settling, inside.pushes, result.comparison),
+        *path_pictures(inside, result.comparison),
     ]
-    return {block.name: one for one in drawn for block in one.blocks if isinstance(block, Picture)}
+    return {block.name: section for section in drawn for block in section.blocks if isinstance(block, Picture)}
 
 
 def named(drawing: Section, name: str) -> list[dict[str, Any]]:
@@ -48,13 +48,13 @@ def words(drawing: Section) -> str:
     return "".join(block.text for block in drawing.blocks if isinstance(block, Words))
 
 
-def test_deviations_of_both_results_are_in_one_picture(given: Arguments) -> None:
-    found = evaluated(given, *READ, compare=given["compare"])
-    drawn = pictures(found)
+def test_deviations_of_both_results_are_in_one_picture(arguments: Arguments) -> None:
+    result = evaluated(arguments, *READ, compare=arguments["compare"])
+    drawn = pictures(result)
     other, own = named(drawn["paths"], "other result"), named(drawn["paths"], "barycentre")
     assert len(other) == len(own) == 4
-    for one, beside in zip(own, other, strict=True):  # it is beside itself
-        assert beside["y"] == pytest.approx(one["y"], abs=1e-3)
+    for trace, beside in zip(own, other, strict=True):  # it is beside itself
+        assert beside["y"] == pytest.approx(trace["y"], abs=1e-3)
         assert beside["line"]["dash"] == "dash"
     assert "Dashed: the barycentre of the other result." in words(drawn["paths"])
     arrows = named(drawn["accuracy"], "of the other result")
@@ -67,8 +67,8 @@ def test_deviations_of_both_results_are_in_one_picture(given: Arguments) -> None
     assert "The pale ones are those of the other result." in words(drawn["accuracy"])
 
 
-def test_a_result_alone_has_no_other_one_in_its_pictures(given: Arguments) -> None:
-    drawn = pictures(evaluated(given, *READ))
+def test_a_result_alone_has_no_other_one_in_its_pictures(arguments: Arguments) -> None:
+    drawn = pictures(evaluated(arguments, *READ))
     assert named(drawn["paths"], "other result") == named(drawn["accuracy"], "of the other result") == []
     assert "other" not in words(drawn["paths"]) + words(drawn["accuracy"])
 
@@ -87,29 +87,29 @@ def _holes(result: dict[str, Any]) -> None:
     ],
 )
 def test_what_the_other_result_does_not_have_is_not_drawn(
-    change: Callable[[dict[str, Any]], object], curves: int, given: Arguments, tmp_path: Path
+    change: Callable[[dict[str, Any]], object], curves: int, arguments: Arguments, tmp_path: Path
 ) -> None:
-    other = json.loads(given["compare"].read_text())
+    other = json.loads(arguments["compare"].read_text())
     change(other)
     (tmp_path / RESULT).write_text(json.dumps(other))
-    found = evaluated(given, *READ, compare=tmp_path / RESULT)
-    assert len(named(pictures(found)["paths"], "other result")) == curves
-    assert ("of the other result" in found.contents()["report.html"]) == (curves > 0)
+    result = evaluated(arguments, *READ, compare=tmp_path / RESULT)
+    assert len(named(pictures(result)["paths"], "other result")) == curves
+    assert ("of the other result" in result.contents()["report.html"]) == (curves > 0)
 
 
-def test_several_velocities_are_broken_behind_commas(given: Arguments) -> None:
-    page = evaluated(given, *READ, compare=given["compare"]).contents()["report.html"]
+def test_several_velocities_are_broken_behind_commas(arguments: Arguments) -> None:
+    page = evaluated(arguments, *READ, compare=arguments["compare"]).contents()["report.html"]
     assert "<td>50\u00a0%:\u00a0" in page
     assert '<td class="n">50\u00a0%' not in page
 
 
 def test_the_warning_names_the_components_that_the_instrument_is_too_coarse_for(small: Arguments) -> None:
-    found = evaluated(small, "poses", noise=1e-3)
-    said = notices(found)["instrument-too-coarse"]
-    assert said.level == "warning"
-    coarse = {(value.id, value.component) for value in found.values if value.status == "instrument-too-coarse"}
+    result = evaluated(small, "poses", noise=1e-3)
+    notice = notices(result)["instrument-too-coarse"]
+    assert notice.level == "warning"
+    coarse = {(value.id, value.component) for value in result.values if value.status == "instrument-too-coarse"}
     assert ("RP", "position") in coarse
-    assert "more" not in said.message.partition("values of")[2].partition(". They")[0]
+    assert "more" not in notice.message.partition("values of")[2].partition(". They")[0]
     for id_, component in coarse:
-        inside = said.message.partition(f" {id_}")[2]
+        inside = notice.message.partition(f" {id_}")[2]
         assert component == "position" or component in inside.partition(")")[0]

@@ -22,10 +22,10 @@ def test_a_plan_is_made_in_percent_and_millimetres(truearm: Truearm, folder: Pat
     run = truearm(
         *words, "--velocity", "400", "--velocities", "50,10", "--limit-band", "0.2", "--out", "made", "--json"
     )
-    found = json.loads(run.out)
-    assert found["cube_mm"]["side"] == 200.0
-    assert found["rated_velocity_mm_s"] == 400.0
-    assert [test["velocities_percent"] for test in found["tests"]] == [[50.0, 10.0], [50.0]]
+    summary = json.loads(run.out)
+    assert summary["cube_mm"]["side"] == 200.0
+    assert summary["rated_velocity_mm_s"] == 400.0
+    assert [test["velocities_percent"] for test in summary["tests"]] == [[50.0, 10.0], [50.0]]
     assert "limit_band: 0.2" in (folder / "made" / "plan.yaml").read_text()
     again = truearm(*words, "--out", "other")
     assert (again.code, "rated-velocity-assumed" in again.out) == (0, True)
@@ -34,9 +34,9 @@ def test_a_plan_is_made_in_percent_and_millimetres(truearm: Truearm, folder: Pat
 
 def test_an_evaluation_is_printed_as_a_table_or_as_json(truearm: Truearm, folder: Path) -> None:
     words = ("iso9283", "evaluate", "plan.yaml", "--poses", "poses.csv", "--alignment", "alignment.yaml")
-    found = json.loads(truearm(*words, "--noise", "0.001", "--out", "made", "--json").out)
-    assert found["instrument"]["sigma_mm"] == pytest.approx(0.001)
-    assert {entry["id"] for entry in found["criteria"] if entry["status"] != "not-measured"} == {"AP", "RP"}
+    summary = json.loads(truearm(*words, "--noise", "0.001", "--out", "made", "--json").out)
+    assert summary["instrument"]["sigma_mm"] == pytest.approx(0.001)
+    assert {entry["id"] for entry in summary["criteria"] if entry["status"] != "not-measured"} == {"AP", "RP"}
     run = truearm(*words, "--out", "made", "--compare", "made/iso9283.json")
     assert run.code == 2
     assert "would be overwritten. Choose another --out" in run.err

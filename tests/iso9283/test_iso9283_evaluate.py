@@ -38,35 +38,35 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Arguments:
 
 
 @pytest.fixture(scope="module")
-def found(campaign: Arguments) -> Iso9283Evaluation:
+def result(campaign: Arguments) -> Iso9283Evaluation:
     return evaluated(campaign, *FILES, out=campaign["plan"].parent / "evaluated")
 
 
-def positions(found: Iso9283Evaluation, criterion: str) -> dict[str, Value]:
-    return {value.where: value for value in found.values if value.id == criterion and value.component == "position"}
+def positions(result: Iso9283Evaluation, criterion: str) -> dict[str, Value]:
+    return {value.where: value for value in result.values if value.id == criterion and value.component == "position"}
 
 
-def test_every_criterion_has_a_value_and_the_files_hold_it(found: Iso9283Evaluation, campaign: Arguments) -> None:
-    assert {value.id for value in found.values} == {*TEST_OF}
-    assert all(value.status != "not-measured" for value in found.values if value.component == "position")
+def test_every_criterion_has_a_value_and_the_files_hold_it(result: Iso9283Evaluation, campaign: Arguments) -> None:
+    assert {value.id for value in result.values} == {*TEST_OF}
+    assert all(value.status != "not-measured" for value in result.values if value.component == "position")
     folder = campaign["plan"].parent / "evaluated"
-    held = json.loads((folder / "iso9283.json").read_text())
-    assert held == json.loads(json.dumps(found.summary()))
+    content = json.loads((folder / "iso9283.json").read_text())
+    assert content == json.loads(json.dumps(result.summary()))
     keys = {"id", "component", "where", "value", "unit", "interval_95", "cycles", "conditions", "status"}
-    assert all(keys <= {*entry} <= keys | {"range", "bandwidth_hz"} for entry in held["criteria"])
-    assert held["alignment"]["kind"] == "base-features"
-    given = {**campaign, "robot": campaign["plan"].with_name("robot.yaml")}
-    assert held["inputs"] == {
-        name: {"file": str(given[name]), "sha256": hashlib.sha256(Path(given[name]).read_bytes()).hexdigest()}
+    assert all(keys <= {*entry} <= keys | {"range", "bandwidth_hz"} for entry in content["criteria"])
+    assert content["alignment"]["kind"] == "base-features"
+    files = {**campaign, "robot": campaign["plan"].with_name("robot.yaml")}
+    assert content["inputs"] == {
+        name: {"file": str(files[name]), "sha256": hashlib.sha256(Path(files[name]).read_bytes()).hexdigest()}
         for name in ("plan", "poses", "paths", "settling", "forces", "alignment", "robot")
     }
 
 
-def test_pose_accuracy_is_what_the_twin_truly_misses(found: Iso9283Evaluation) -> None:
+def test_pose_accuracy_is_what_the_twin_truly_misses(result: Iso9283Evaluation) -> None:
     plan = small_plan(["AP"])
     truth = truth_twin(plan.robot, "random", np.random.default_rng(1))
     # The controller commands what brings the nominal flange to the pose.
-    for name, value in positions(found, "AP").items():
+    for name, value in positions(result, "AP").items():
         pose = plan.poses[name]
         true = truth.robot.with_payload(replace(truth.robot.payload, mass=plan.rated_load))
         at, _ = true.world_poses(pose.joints[None])
@@ -77,20 +77,20 @@ def test_pose_accuracy_is_what_the_twin_truly_misses(found: Iso9283Evaluation) -
         assert value.value == pytest.approx(missed, rel=0.1)
 
 
-def test_the_command_shows_each_criterion_once(found: Iso9283Evaluation) -> None:
-    text = found.lines()
+def test_the_command_shows_each_criterion_once(result: Iso9283Evaluation) -> None:
+    text = result.lines()
     assert len(text) < 40
     for criterion in TEST_OF:
         assert sum(line.startswith(f"  {criterion} ") for line in text) == 1
-    worst = max(positions(found, "AP").values(), key=lambda value: value.value)
+    worst = max(positions(result, "AP").values(), key=lambda value: value.value)
     assert any(line.startswith(f"  AP                {worst.where}, worst of 5") for line in text)
 
 
 def test_the_worst_place_is_taken_at_the_fastest_velocity_and_loads_stay_apart() -> None:
-    def value(where: str, number: float, velocity: float, load: float) -> Value:
-        return Value("AD", "position", where, number, "length", None, 30, Conditions(velocity, load), "measured")
+    def value(place: str, number: float, velocity: float, load: float) -> Value:
+        return Value("AD", "position", place, number, "length", None, 30, Conditions(velocity, load), "measured")
 
-    found = worst_places(
+    worst = worst_places(
         [
             value("a", 1e-3, 0.5, 1.0),
             value("a", 1e-3, 1.0, 1.0),
@@ -99,15 +99,15 @@ def test_the_worst_place_is_taken_at_the_fastest_velocity_and_loads_stay_apart()
             value("c", float("nan"), 1.0, 1.0),
         ]
     )
-    assert [one.cells[:3] for one in found] == [
+    assert [row.cells[:3] for row in worst] == [
         ("AD", "b, worst of 2 of 3", "-2.0000 mm"),
         ("AD", "a, load 10 %", "4.0000 mm"),
     ]
-    assert found[0].cells[4:] == ("50 %: 1.0000", "not-measured: c")
+    assert worst[0].cells[4:] == ("50 %: 1.0000", "not-measured: c")
 
 
-def test_the_report_has_a_picture_of_every_test_and_stays_small(found: Iso9283Evaluation) -> None:
-    page = found.contents()["report.html"]
+def test_the_report_has_a_picture_of_every_test_and_stays_small(result: Iso9283Evaluation) -> None:
+    page = result.contents()["report.html"]
     pictures = "clouds accuracy approaches robots drift settling posing-time compliance paths paths-reoriented corners"
     assert {*re.findall(r'<div class="figure" id="([^"]+)"', page)} == {*pictures.split(), "velocity", "weave"}
     assert "needs the standard" in page
@@ -126,15 +126,15 @@ def test_streams_without_cycles_are_drawn_as_what_was_found_in_them(small: Argum
         row.update({"cycle": "", "time [s]": f"{last:.6f}"})
 
     each_row(small["paths"], without_cycle)
-    made = evaluated(small, "paths")
-    assert positions(made, "AV")["line"].cycles == 3
-    assert 'id="streams"' in made.contents()["report.html"]
+    result = evaluated(small, "paths")
+    assert positions(result, "AV")["line"].cycles == 3
+    assert 'id="streams"' in result.contents()["report.html"]
 
 
 def test_what_was_not_measured_is_said(small: Arguments) -> None:
-    made = evaluated(small, "forces")
-    assert "Not measured: AP, RP, t, OV, AV, RV, FV." in made.lines()
-    (absent,) = [entry for entry in made.summary()["criteria"] if entry["id"] == "AP"]
+    result = evaluated(small, "forces")
+    assert "Not measured: AP, RP, t, OV, AV, RV, FV." in result.lines()
+    (absent,) = [entry for entry in result.summary()["criteria"] if entry["id"] == "AP"]
     assert absent == {**absent, "value": None, "interval_95": None, "cycles": 0, "status": "not-measured"}
 
 
@@ -162,11 +162,11 @@ def test_fewer_and_more_cycles_than_planned_are_said_and_the_values_stand(small:
     lines = small["poses"].read_text().splitlines()
     small["poses"].write_text("\n".join(lines[:-1]) + "\n")
     fewer = evaluated(small, "poses")
-    said = notices(fewer)["too-few-cycles"]
-    assert said.level == "warning"
-    found = re.fullmatch(r"Fewer cycles .* measured: AP (P\d): (\d+) of (\d+); RP \1: \2 of \3. .*", said.message)
-    assert found is not None
-    assert int(found[2]) == int(found[3]) - 1
+    notice = notices(fewer)["too-few-cycles"]
+    assert notice.level == "warning"
+    match = re.fullmatch(r"Fewer cycles .* measured: AP (P\d): (\d+) of (\d+); RP \1: \2 of \3. .*", notice.message)
+    assert match is not None
+    assert int(match[2]) == int(match[3]) - 1
     assert {"too-few-cycles", "measured"} <= {value.status for value in positions(fewer, "AP").values()}
     assert all(np.isfinite(value.value) for value in positions(fewer, "AP").values())
 
@@ -203,17 +203,17 @@ def test_an_outlying_row_is_said_with_the_value_without_it(small: Arguments) -> 
             row["y [mm]"] = str(float(row["y [mm]"]) + 5.0)
 
     each_row(small["poses"], off_on_line_9)
-    said = notices(evaluated(small, "poses"))["outlying-row"]
-    assert said.level == "warning"
+    notice = notices(evaluated(small, "poses"))["outlying-row"]
+    assert notice.level == "warning"
     assert re.search(
         rf"^Cycle 2 of AP {lines[7]['pose']}, 100 %, load 100 %, on line 9 lies 5(\.\d+)? mm from the others, which "
         r"scatter by 0\.\d+ mm: RP is \d\.\d{4} mm, without it 0\.\d{4}; AP is \d\.\d{4} mm, without it \d\.\d{4}\. ",
-        said.message,
+        notice.message,
     )
 
 
 def test_two_places_of_rest_are_said_with_the_rows_of_the_fewer(tmp_path: Path) -> None:
-    given = planned_in(tmp_path, small_plan(["AP"], cycles={"AP": 24}), noise=1e-6)
+    arguments = planned_in(tmp_path, small_plan(["AP"], cycles={"AP": 24}), noise=1e-6)
     rows: list[Row] = []
     lines = []
 
@@ -223,11 +223,13 @@ def test_two_places_of_rest_are_said_with_the_rows_of_the_fewer(tmp_path: Path) 
             row["z [mm]"] = str(float(row["z [mm]"]) + 0.3)
             lines.append(str(len(rows) + 1))
 
-    each_row(given["poses"], elsewhere)
-    (said,) = [one for one in evaluated(given, "poses").warnings if one.code in ("two-places", "outlying-row")]
-    assert (said.code, said.level) == ("two-places", "warning")
-    assert "AP P4, 100 %, load 100 % (6 and 18 cycles, 0.3" in said.message
-    assert f"the 6 on lines {', '.join(lines)})" in said.message
+    each_row(arguments["poses"], elsewhere)
+    (notice,) = [
+        warning for warning in evaluated(arguments, "poses").warnings if warning.code in ("two-places", "outlying-row")
+    ]
+    assert (notice.code, notice.level) == ("two-places", "warning")
+    assert "AP P4, 100 %, load 100 % (6 and 18 cycles, 0.3" in notice.message
+    assert f"the 6 on lines {', '.join(lines)})" in notice.message
 
 
 def test_orientations_that_are_degrees_off_are_said(small: Arguments) -> None:
@@ -240,33 +242,36 @@ def test_orientations_that_are_degrees_off_are_said(small: Arguments) -> None:
         row.update(zip(names, map(str, quaternion_from_rotation(rotation @ turn)[0]), strict=True))
 
     each_row(small["poses"], turned)
-    said = notices(evaluated(small, "poses", noise_rot=1e-5))["orientation-far-off"]
-    off_by = re.search(r"up to -?(\d\.\d+) deg \(AP c of P\d\)", said.message)
-    assert said.level == "warning"
+    notice = notices(evaluated(small, "poses", noise_rot=1e-5))["orientation-far-off"]
+    off_by = re.search(r"up to -?(\d\.\d+) deg \(AP c of P\d\)", notice.message)
+    assert notice.level == "warning"
     assert off_by
     assert float(off_by[1]) == pytest.approx(5.73, abs=0.5)
 
 
 def test_a_pose_without_a_row_is_said_and_stands_in_the_table(small: Arguments) -> None:
     each_row(small["poses"], lambda row: row["pose"] != "P3")
-    made = evaluated(small, "poses")
-    said = notices(made)["places-missing"]
-    assert (said.level, said.message.split(". ")[0]) == ("warning", "Planned and without a row: AP: P3")
-    (row,) = [line for line in made.lines() if line.startswith("  AP ")]
+    result = evaluated(small, "poses")
+    notice = notices(result)["places-missing"]
+    assert (notice.level, notice.message.split(". ")[0]) == ("warning", "Planned and without a row: AP: P3")
+    (row,) = [line for line in result.lines() if line.startswith("  AP ")]
     assert "worst of 4 of 5" in row
     assert row.endswith("not-measured: P3")
-    assert "worst of 4 of 5" in str(made.contents()["report.html"]).replace("\N{NO-BREAK SPACE}", " ")
+    assert "worst of 4 of 5" in str(result.contents()["report.html"]).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_places_and_velocities_of_other_tests_without_a_value_are_said() -> None:
     plan = small_plan(["AT", "posing-time", "AV"], velocities=(1.0, 0.5))
 
-    def value(id_: str, where: str, velocity: float | None) -> Value:
-        return Value(id_, "position", where, 1.0, "length", None, 3, Conditions(velocity, 1.0), "measured")
+    def value(id_: str, place: str, velocity: float | None) -> Value:
+        return Value(id_, "position", place, 1.0, "length", None, 3, Conditions(velocity, 1.0), "measured")
 
-    there = [value("AT", place, v) for place in ("line", "rectangle", "large-circle") for v in (1.0, 0.5)]
-    there += [value("AT", "small-circle", 0.5), value("posing-time", "P1-D50", None)]
-    assert [one.words for one in missing_places(plan, there)] == ["AT: small-circle at 100 %", "posing-time: P1-D10"]
+    values = [value("AT", place, v) for place in ("line", "rectangle", "large-circle") for v in (1.0, 0.5)]
+    values += [value("AT", "small-circle", 0.5), value("posing-time", "P1-D50", None)]
+    assert [missing.words for missing in missing_places(plan, values)] == [
+        "AT: small-circle at 100 %",
+        "posing-time: P1-D10",
+    ]
 
 
 def test_a_result_is_compared_with_itself_and_with_a_better_one(small: Arguments, tmp_path: Path) -> None:
@@ -300,8 +305,8 @@ def test_results_that_were_tied_differently_are_not_compared_where_it_matters(sm
     tied = evaluated(small, "poses", compare=tmp_path / "fitted" / RESULT)
     assert tied.comparison is not None
     assert {row.id for row in tied.comparison.rows} == {"RP"}
-    said = notices(tied)["alignment-differs"]
-    assert (said.level, "AP" in said.message) == ("warning", True)
+    notice = notices(tied)["alignment-differs"]
+    assert (notice.level, "AP" in notice.message) == ("warning", True)
 
 
 def _entry(entry: str, value: object) -> Callable[[dict[str, object]], object]:
@@ -309,7 +314,7 @@ def _entry(entry: str, value: object) -> Callable[[dict[str, object]], object]:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "words"),
     [
         (_entry("robot", "kr5"), "of another robot"),
         (_entry("truearm", "truearm-iso9283-result/2"), "no result of tests by ISO 9283"),
@@ -322,7 +327,7 @@ def _entry(entry: str, value: object) -> Callable[[dict[str, object]], object]:
     ],
 )
 def test_what_is_no_other_result_is_refused(
-    small: Arguments, tmp_path: Path, change: str | Callable[[Any], object], said: str
+    small: Arguments, tmp_path: Path, change: str | Callable[[Any], object], words: str
 ) -> None:
     evaluated(small, "forces", out=tmp_path / "first")
     text = (tmp_path / "first" / RESULT).read_text()
@@ -333,9 +338,9 @@ def test_what_is_no_other_result_is_refused(
         change(result)
         text = json.dumps(result)
     (tmp_path / RESULT).write_text(text)
-    found = refusal_of(small, "forces", compare=tmp_path / RESULT)
-    assert found.parameter == "compare"
-    assert said in str(found)
+    refusal = refusal_of(small, "forces", compare=tmp_path / RESULT)
+    assert refusal.parameter == "compare"
+    assert words in str(refusal)
 
 
 def test_values_of_criteria_that_are_not_known_are_left_out_of_a_comparison(small: Arguments, tmp_path: Path) -> None:
@@ -353,8 +358,8 @@ def test_nothing_measured_is_refused(small: Arguments) -> None:
 
 def test_a_file_that_is_missing_is_refused_by_its_parameter(small: Arguments) -> None:
     for name in (*FILES, "plan", "alignment"):
-        found = refusal_of({**small, name: small["plan"].with_name("none.csv")})
-        assert (found.parameter, "no such file" in str(found)) == (name, True)
+        refusal = refusal_of({**small, name: small["plan"].with_name("none.csv")})
+        assert (refusal.parameter, "no such file" in str(refusal)) == (name, True)
     for name in ("noise", "noise_rot"):
-        found = refusal_of(small, "poses", **{name: 0.0})
-        assert (found.parameter, "no instrument is without noise" in str(found)) == (name, True)
+        refusal = refusal_of(small, "poses", **{name: 0.0})
+        assert (refusal.parameter, "no instrument is without noise" in str(refusal)) == (name, True)

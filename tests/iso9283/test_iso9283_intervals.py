@@ -26,8 +26,8 @@ def ball(rng: np.random.Generator, *size: int) -> Array:
 
 
 def scatter(kind: str, rng: np.random.Generator, *size: int) -> Array:
-    made = {"isotropic": (1.0, 1.0, 1.0), "anisotropic": (10.0, 1.0, 1.0)}
-    return ball(rng, *size) if kind == "ball" else rng.standard_normal((*size, 3)) * made[kind]
+    deviations = {"isotropic": (1.0, 1.0, 1.0), "anisotropic": (10.0, 1.0, 1.0)}
+    return ball(rng, *size) if kind == "ball" else rng.standard_normal((*size, 3)) * deviations[kind]
 
 
 def share(intervals: list[Interval | None], truth: float) -> float:
@@ -41,10 +41,10 @@ def test_pose_accuracy(kind: str, size: float) -> None:
     rng = np.random.default_rng(1)
     true = size * np.array([1.0, 1.0, 1.0])
     points = scatter(kind, rng, CAMPAIGNS, CYCLES) + true
-    found = [norm_interval(p.mean(axis=0), np.cov(p.T), CYCLES, np.zeros((3, 3))) for p in points]
-    assert share(found, float(np.linalg.norm(true))) >= LEAST
+    intervals = [norm_interval(p.mean(axis=0), np.cov(p.T), CYCLES, np.zeros((3, 3))) for p in points]
+    assert share(intervals, float(np.linalg.norm(true))) >= LEAST
     if size == 20.0:
-        widths = np.diff(np.array(found, float), axis=1).mean()
+        widths = np.diff(np.array(intervals, float), axis=1).mean()
         deviation = np.sqrt(scatter(kind, rng, 100_000).sum(axis=1).var() / 3 / CYCLES)
         assert widths < 1.2 * 2 * 1.96 * deviation
 
@@ -54,12 +54,12 @@ def test_repeatability(kind: str) -> None:
     rng = np.random.default_rng(2)
     length = np.linalg.norm(scatter(kind, rng, 300_000), axis=1)
     truth = float(length.mean() + 3 * length.std())
-    found = [repeatability_interval(points) for points in scatter(kind, rng, CAMPAIGNS, CYCLES)]
-    assert share(found, truth) >= LEAST
+    intervals = [repeatability_interval(points) for points in scatter(kind, rng, CAMPAIGNS, CYCLES)]
+    assert share(intervals, truth) >= LEAST
     campaigns = scatter(kind, rng, 4000, CYCLES)
     distance = np.linalg.norm(campaigns - campaigns.mean(axis=1, keepdims=True), axis=2)
     own = np.quantile(distance.mean(axis=1) + 3 * distance.std(axis=1, ddof=1), (0.025, 0.975))
-    assert np.mean(np.diff(np.array(found, float), axis=1)) < 1.5 * np.diff(own)[0]
+    assert np.mean(np.diff(np.array(intervals, float), axis=1)) < 1.5 * np.diff(own)[0]
 
 
 def test_means_and_spreads() -> None:
@@ -77,9 +77,9 @@ def test_largest_differences(apart: float) -> None:
     rng = np.random.default_rng(4)
     places = np.array([[0.0, 0, 0], [0, 0, 0], [apart, 0, 0]])
     points = rng.standard_normal((100, 3, CYCLES, 3)) + places[:, None]
-    found = [largest_difference(list(p), [(0, 1), (0, 2), (1, 2)])[1] for p in points]
-    assert share(found, apart) >= LEAST
-    assert np.mean(np.diff(np.array(found, float), axis=1)) < 1.5
+    intervals = [largest_difference(list(p), [(0, 1), (0, 2), (1, 2)])[1] for p in points]
+    assert share(intervals, apart) >= LEAST
+    assert np.mean(np.diff(np.array(intervals, float), axis=1)) < 1.5
 
 
 def test_what_does_not_scatter_or_is_too_little_has_no_interval() -> None:
@@ -98,8 +98,8 @@ def test_intervals_have_the_unit_of_the_values() -> None:
     def of_norm(p: Array) -> Interval | None:
         return norm_interval(p.mean(axis=0), np.cov(p.T), 30, np.zeros((3, 3)))
 
-    for made in (repeatability_interval, of_norm):
-        metres, millimetres = made(points), made(1e3 * points)
+    for interval_of in (repeatability_interval, of_norm):
+        metres, millimetres = interval_of(points), interval_of(1e3 * points)
         assert metres is not None
         assert millimetres is not None
         assert np.array(millimetres) == pytest.approx(1e3 * np.array(metres), rel=1e-6)

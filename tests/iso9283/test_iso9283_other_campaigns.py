@@ -34,30 +34,30 @@ def added(column: str, amount: float) -> Callable[[Row], None]:
     return lambda row: row.update({column: str(float(row[column]) + amount)})
 
 
-def forces_of(given: Arguments, change: Callable[[Row], object]) -> Iso9283Evaluation:
-    each_row(given["forces"], change)
-    return evaluated(given, "forces")
+def forces_of(arguments: Arguments, change: Callable[[Row], object]) -> Iso9283Evaluation:
+    each_row(arguments["forces"], change)
+    return evaluated(arguments, "forces")
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_separators_and_columns_that_do_not_fit_are_named_with_what_to_do(small: Arguments, name: str) -> None:
     text = small[name].read_text()
     first, *rows = text.splitlines()
-    for spoilt, came, cure in (
+    for spoilt, stated, cure in (
         (text.replace(",", ";"), "semicolons", "Save the file with commas and decimal points."),
         ("\n".join([f"{first},note", *(f"{row},a" for row in rows)]), "note", "Rename it, or leave it out."),
         (text.replace("cycle", "cycel", 1), "cycel", "Did you mean cycle?"),
     ):
         small[name].write_text(spoilt)
-        found = refusal_of(small)
-        assert (found.parameter, found.came, found.cure) == (name, came, cure)
+        refusal = refusal_of(small)
+        assert (refusal.parameter, refusal.came, refusal.cure) == (name, stated, cure)
 
 
 def test_a_pose_that_is_like_none_is_not_taken_for_another(small: Arguments) -> None:
     small["poses"].write_text(small["poses"].read_text().replace(",P1,", ",P9,", 1))
-    found = refusal_of(small)
-    assert found.came == "P9"
-    assert "Did you mean" not in str(found)
+    refusal = refusal_of(small)
+    assert refusal.came == "P9"
+    assert "Did you mean" not in str(refusal)
 
 
 def test_an_alignment_in_another_unit_is_named_and_no_path(small: Arguments) -> None:
@@ -66,43 +66,43 @@ def test_an_alignment_in_another_unit_is_named_and_no_path(small: Arguments) -> 
     assert numbers is not None
     metres = ", ".join(str(float(number) / 1e3) for number in numbers[1].split(","))
     small["alignment"].write_text(text.replace(numbers[1], metres))
-    found = refusal_of(small)
-    assert found.parameter == "alignment"
-    assert str(small["alignment"]) in str(found)
-    assert "Is the position in m where the file says mm?" in str(found)
+    refusal = refusal_of(small)
+    assert refusal.parameter == "alignment"
+    assert str(small["alignment"]) in str(refusal)
+    assert "Is the position in m where the file says mm?" in str(refusal)
 
 
 def test_readings_elsewhere_than_their_pose_are_refused(small: Arguments) -> None:
     each_row(small["forces"], added("y [mm]", 60.0))
-    said = str(refusal_of(small, "forces"))
-    assert re.search(r"line 2: the tip is not at P1 where it is pushed least in cycle 1 of .* \+x", said)
+    message = str(refusal_of(small, "forces"))
+    assert re.search(r"line 2: the tip is not at P1 where it is pushed least in cycle 1 of .* \+x", message)
     each_row(small["settling"], added("z [mm]", 120.0))
-    said = str(refusal_of(small, "settling"))
-    assert re.search(r"at another place than P1 in cycle 1 of t; got '1[12].* mm from P1'", said)
+    message = str(refusal_of(small, "settling"))
+    assert re.search(r"at another place than P1 in cycle 1 of t; got '1[12].* mm from P1'", message)
 
 
 @pytest.mark.parametrize("poses", [True, False])
 def test_pushes_in_another_unit_are_refused(small: Arguments, poses: bool) -> None:
     small["forces"].write_text(small["forces"].read_text().replace("[mm]", "[m]"))
-    found = refusal_of(small, "forces", *(("poses",) if poses else ()))
-    assert found.parameter == ("forces" if poses else "alignment")
-    assert "from its centre" in str(found)
+    refusal = refusal_of(small, "forces", *(("poses",) if poses else ()))
+    assert refusal.parameter == ("forces" if poses else "alignment")
+    assert "from its centre" in str(refusal)
 
 
 @pytest.mark.parametrize(("factor", "kilograms"), [(1 / 9.80665, True), (0.5, False)])
 def test_forces_well_below_the_rated_ones_are_said(small: Arguments, factor: float, kilograms: bool) -> None:
-    found = forces_of(small, lambda row: row.update({"force [N]": str(factor * float(row["force [N]"]))}))
-    said = notices(found)["low-forces"].message
-    assert ("are these kg?" in said) == kilograms
-    assert "29.42 N" in said
+    result = forces_of(small, lambda row: row.update({"force [N]": str(factor * float(row["force [N]"]))}))
+    message = notices(result)["low-forces"].message
+    assert ("are these kg?" in message) == kilograms
+    assert "29.42 N" in message
 
 
 def test_directions_under_the_name_of_another_axis_are_said(small: Arguments) -> None:
     assert not {"sideways-push", "low-forces"} & {*notices(evaluated(small, "forces"))}
     names = {"x": "y", "y": "x", "z": "z"}
-    found = forces_of(small, lambda row: row.update(direction=row["direction"][0] + names[row["direction"][1]]))
-    assert "most along y" in notices(found)["sideways-push"].message
-    assert "+z" not in notices(found)["sideways-push"].message
+    result = forces_of(small, lambda row: row.update(direction=row["direction"][0] + names[row["direction"][1]]))
+    assert "most along y" in notices(result)["sideways-push"].message
+    assert "+z" not in notices(result)["sideways-push"].message
 
 
 def test_a_push_beside_the_line_of_the_others_is_said_with_and_without_it(small: Arguments) -> None:
@@ -114,10 +114,10 @@ def test_a_push_beside_the_line_of_the_others_is_said_with_and_without_it(small:
             row["x [mm]"] = str(float(row["x [mm]"]) + 3.0)
 
     assert "outlying-push" not in notices(evaluated(small, "forces"))
-    said = notices(forces_of(small, off_on_line_4))["outlying-push"]
-    assert (said.level, said.summary()["formerly"]) == ("warning", "wild-push")
-    assert "line 4" in said.message
-    assert "without it" in said.message
+    notice = notices(forces_of(small, off_on_line_4))["outlying-push"]
+    assert (notice.level, notice.summary()["formerly"]) == ("warning", "wild-push")
+    assert "line 4" in notice.message
+    assert "without it" in notice.message
 
 
 def test_poses_of_another_cube_are_said(small: Arguments) -> None:
@@ -131,20 +131,20 @@ def test_poses_of_another_cube_are_said(small: Arguments) -> None:
 
     assert "other-cube" not in notices(evaluated(small, "poses"))
     each_row(small["poses"], larger)
-    said = notices(evaluated(small, "poses"))["other-cube"].message
-    assert "lie as those of a cube of" in said
-    assert "Give the plan.yaml that was measured." in said
+    message = notices(evaluated(small, "poses"))["other-cube"].message
+    assert "lie as those of a cube of" in message
+    assert "Give the plan.yaml that was measured." in message
 
 
 def test_posing_times_are_held_against_the_planned_distance(tmp_path: Path) -> None:
-    given = planned_in(tmp_path, small_plan(["posing-time"], cycles={"posing-time": 1}), rate=100.0)
-    settling = given["settling"]
+    arguments = planned_in(tmp_path, small_plan(["posing-time"], cycles={"posing-time": 1}), rate=100.0)
+    settling = arguments["settling"]
     whole = settling.read_text()
-    assert len(evaluated(given, "settling").values) == 2
+    assert len(evaluated(arguments, "settling").values) == 2
     swapped = {"D10": "D50", "D50": "D10"}
     each_row(settling, lambda row: row.update(pose=swapped[row["pose"]]))
-    said = str(refusal_of(given, "settling"))
-    assert re.search(r"at another place than D50 .* mm from D50, .* mm from D10", said)
+    message = str(refusal_of(arguments, "settling"))
+    assert re.search(r"at another place than D50 .* mm from D50, .* mm from D10", message)
     settling.write_text(whole)
     places: list[np.ndarray] = []
 
@@ -154,8 +154,8 @@ def test_posing_times_are_held_against_the_planned_distance(tmp_path: Path) -> N
         return bool(row["pose"] == "D50" and np.linalg.norm(places[-1] - began) > 15.0)
 
     each_row(settling, has_begun)
-    said = str(refusal_of(given, "settling"))
-    assert "the way to D50 in cycle 1 of posing-time is not the planned one" in said
+    message = str(refusal_of(arguments, "settling"))
+    assert "the way to D50 in cycle 1 of posing-time is not the planned one" in message
 
 
 def drift(folder: Path, times: list[str], cycles: list[int] | None = None) -> Arguments:
@@ -178,13 +178,13 @@ def hourly(*, unit: float = 1.0, start: float = 0.0, day: float = np.inf) -> lis
     return [f"{(start + 3600.0 * group + 10.0 * k) / unit % day:.3f}" for group in range(5) for k in range(10)]
 
 
-def in_order(given: Arguments, order: np.ndarray) -> None:
-    head, *rows = given["poses"].read_text().splitlines()
-    given["poses"].write_text("\n".join([head, *(rows[k] for k in order)]) + "\n")
+def in_order(arguments: Arguments, order: np.ndarray) -> None:
+    head, *rows = arguments["poses"].read_text().splitlines()
+    arguments["poses"].write_text("\n".join([head, *(rows[k] for k in order)]) + "\n")
 
 
 @pytest.mark.parametrize(
-    ("times", "said"),
+    ("times", "words"),
     [
         (hourly()[:20], "2 groups over 1 h."),
         (hourly(unit=60.0), "5 groups over 0.0667 h (are the times in minutes?)"),
@@ -192,38 +192,38 @@ def in_order(given: Arguments, order: np.ndarray) -> None:
         ([""] * 50, "the rows of dAP have no times"),
     ],
 )
-def test_drift_over_another_time_than_planned_is_said(tmp_path: Path, times: list[str], said: str) -> None:
+def test_drift_over_another_time_than_planned_is_said(tmp_path: Path, times: list[str], words: str) -> None:
     message = notices(evaluated(drift(tmp_path, times), "poses"))["drift-time"].message
     assert "planned over 4 h" in message
-    assert said in message
+    assert words in message
 
 
 def test_drift_as_planned_is_not_said_and_the_order_of_rows_does_not_matter(tmp_path: Path) -> None:
-    given = drift(tmp_path, hourly())
-    one = evaluated(given, "poses")
-    assert not {"drift-time", "single-drift-group"} & {*notices(one)}
+    arguments = drift(tmp_path, hourly())
+    result = evaluated(arguments, "poses")
+    assert not {"drift-time", "single-drift-group"} & {*notices(result)}
     order = np.random.default_rng(1).permutation(50)
     for other in (order, order[::-1], np.arange(50)[::-1]):
-        in_order(given, other)
-        assert evaluated(given, "poses").values[0].value == pytest.approx(one.values[0].value, rel=1e-9)
+        in_order(arguments, other)
+        assert evaluated(arguments, "poses").values[0].value == pytest.approx(result.values[0].value, rel=1e-9)
 
 
 def test_times_of_drift_that_cannot_be_are_refused(tmp_path: Path) -> None:
-    said = str(refusal_of(drift(tmp_path, hourly(start=79000.0, day=86400.0)), "poses"))
-    assert re.search(r"lines 31 and 32: the time of drift falls by hours .* add 86400 s", said)
-    given = drift(tmp_path, hourly(start=86400.0 - 2 * 3600.0 - 45.0, day=86400.0))
-    in_order(given, np.random.default_rng(1).permutation(50))
-    assert "the times of drift contradict the numbers of its cycles" in str(refusal_of(given, "poses"))
+    message = str(refusal_of(drift(tmp_path, hourly(start=79000.0, day=86400.0)), "poses"))
+    assert re.search(r"lines 31 and 32: the time of drift falls by hours .* add 86400 s", message)
+    arguments = drift(tmp_path, hourly(start=86400.0 - 2 * 3600.0 - 45.0, day=86400.0))
+    in_order(arguments, np.random.default_rng(1).permutation(50))
+    assert "the times of drift contradict the numbers of its cycles" in str(refusal_of(arguments, "poses"))
     times = hourly()
     times[7] = ""
-    said = str(refusal_of(drift(tmp_path, times), "poses"))
-    assert "line 9, column time: 1 row of drift without a time beside rows with one" in said
+    message = str(refusal_of(drift(tmp_path, times), "poses"))
+    assert "line 9, column time: 1 row of drift without a time beside rows with one" in message
 
 
 def test_drift_of_one_group_says_why_there_is_no_value(tmp_path: Path) -> None:
-    found = evaluated(drift(tmp_path, [""] * 20, list(range(1, 21))), "poses")
-    assert found.values[0].status == "not-measured"
-    assert "P1, 100 %, load 100 % (20 cycles)" in notices(found)["single-drift-group"].message
+    result = evaluated(drift(tmp_path, [""] * 20, list(range(1, 21))), "poses")
+    assert result.values[0].status == "not-measured"
+    assert "P1, 100 %, load 100 % (20 cycles)" in notices(result)["single-drift-group"].message
 
 
 def test_a_plan_that_was_changed_by_hand_is_said(small: Arguments, tmp_path: Path) -> None:
@@ -239,9 +239,9 @@ def test_a_plan_that_was_changed_by_hand_is_said(small: Arguments, tmp_path: Pat
 def beside(tmp_path_factory: pytest.TempPathFactory) -> Arguments:
     """Return the arguments of a campaign, and its own result beside it."""
     folder = tmp_path_factory.mktemp("beside")
-    given = arguments_in(folder, performance_files())
-    evaluated(given, *FILES, out=folder / "first")
-    return {**given, "compare": folder / "first" / RESULT}
+    arguments = arguments_in(folder, performance_files())
+    evaluated(arguments, *FILES, out=folder / "first")
+    return {**arguments, "compare": folder / "first" / RESULT}
 
 
 def _bandwidth(result: dict[str, Any]) -> None:
@@ -258,7 +258,7 @@ def _moved(place: str, row: int) -> Callable[[dict[str, Any]], None]:
 
 
 @pytest.mark.parametrize(
-    ("change", "ids", "said"),
+    ("change", "ids", "words"),
     [
         (
             lambda result: result["plan"].update(limit_band_mm=0.5),
@@ -276,19 +276,19 @@ def _moved(place: str, row: int) -> Callable[[dict[str, Any]], None]:
     ],
 )
 def test_what_was_planned_otherwise_is_not_compared(
-    beside: Arguments, tmp_path: Path, change: Callable[[dict[str, Any]], None], ids: set[str], said: str
+    beside: Arguments, tmp_path: Path, change: Callable[[dict[str, Any]], None], ids: set[str], words: str
 ) -> None:
     other = json.loads(beside["compare"].read_text())
     change(other)
     (tmp_path / RESULT).write_text(json.dumps(other))
-    found = evaluated(beside, *FILES, compare=tmp_path / RESULT)
-    assert found.comparison is not None
-    ((why, named),) = found.comparison.unlike.items()
-    assert said in why
+    result = evaluated(beside, *FILES, compare=tmp_path / RESULT)
+    assert result.comparison is not None
+    ((why, named),) = result.comparison.unlike.items()
+    assert words in why
     assert set(named) == ids
-    assert said in notices(found)["plan-differs"].message
-    there = {(row.id, row.where) for row in found.comparison.rows}
-    assert (("AP", "P2") in there, ("AP", "P1") in there) == ("AP" not in ids, True)
+    assert words in notices(result)["plan-differs"].message
+    compared = {(row.id, row.where) for row in result.comparison.rows}
+    assert (("AP", "P2") in compared, ("AP", "P1") in compared) == ("AP" not in ids, True)
 
 
 def test_results_of_another_tip_or_load_are_refused_and_older_ones_said(beside: Arguments, tmp_path: Path) -> None:
@@ -297,8 +297,8 @@ def test_results_of_another_tip_or_load_are_refused_and_older_ones_said(beside: 
     other = json.loads(beside["compare"].read_text())
     file = tmp_path / RESULT
     file.write_text(json.dumps({**other, "rated": {**other["rated"], "load_kg": 5.0}}))
-    said = str(refusal_of(beside, compare=file))
-    assert re.search("no value of the same kind; got .*the rated load was 5 kg there", said)
+    message = str(refusal_of(beside, compare=file))
+    assert re.search("no value of the same kind; got .*the rated load was 5 kg there", message)
     file.write_text(json.dumps({name: value for name, value in other.items() if name != "plan"}))
     assert "cannot be told" in notices(evaluated(beside, *FILES, compare=file))["plan-unknown"].message
     other["plan"]["tip"]["points_mm"][0][2] += 1.0

@@ -50,9 +50,9 @@ def test_joint_positions_bring_the_tip_to_the_poses_in_one_posture(whole: Iso928
     plan = whole.plan
     tip = Tip(plan.robot, plan.target)
     for pose in (*plan.poses.values(), *plan.starts.values()):
-        there = tip.at(pose.joints[None])
-        assert there.position[0] == pytest.approx(pose.position, abs=1e-6)
-        assert np.abs(there.rotation[0] - pose.rotation).max() < 1e-6
+        reached = tip.at(pose.joints[None])
+        assert reached.position[0] == pytest.approx(pose.position, abs=1e-6)
+        assert np.abs(reached.rotation[0] - pose.rotation).max() < 1e-6
 
 
 def test_weaving_is_run_at_the_slowest_velocity_and_optional_speeds_are_left_out(whole: Iso9283Plan) -> None:
@@ -98,7 +98,7 @@ def test_the_rated_velocity_that_is_assumed_is_said(whole: Iso9283Plan, cube: Pa
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("options", "words"),
     [
         ({"criteria": ["ap", "zz"]}, "criteria"),
         ({"criteria": []}, "no criterion is given"),
@@ -115,9 +115,9 @@ def test_the_rated_velocity_that_is_assumed_is_said(whole: Iso9283Plan, cube: Pa
         ({"robot": "puma560"}, "Give it as `load`, or state rated_load"),
     ],
 )
-def test_what_cannot_be_planned_is_refused(given: dict[str, object], said: str, cube: Path) -> None:
-    with pytest.raises(InputError, match=re.escape(said)):
-        truearm.iso9283_plan(**{"robot": "irb120", "criteria": ["ap"], "cube": cube, **given})  # type: ignore[arg-type]
+def test_what_cannot_be_planned_is_refused(options: dict[str, object], words: str, cube: Path) -> None:
+    with pytest.raises(InputError, match=re.escape(words)):
+        truearm.iso9283_plan(**{"robot": "irb120", "criteria": ["ap"], "cube": cube, **options})  # type: ignore[arg-type]
 
 
 def test_a_cube_that_the_arm_cannot_reach_is_refused(tmp_path: Path) -> None:
@@ -125,14 +125,14 @@ def test_a_cube_that_the_arm_cannot_reach_is_refused(tmp_path: Path) -> None:
     far.write_text(CUBE.replace("[350, 0, 350]", "[900, 0, 350]"))
     with pytest.raises(InputError, match=r"cannot come to all poses.*missed: P"):
         truearm.iso9283_plan("irb120", criteria=["ap"], cube=far)
-    for given in ({"cube": far.with_name("none.yaml")}, {"cube": far, "constraints": far.with_name("none.yaml")}):
+    for options in ({"cube": far.with_name("none.yaml")}, {"cube": far, "constraints": far.with_name("none.yaml")}):
         with pytest.raises(InputError, match="no such file") as refusal:
-            truearm.iso9283_plan("irb120", criteria=["ap"], **given)  # type: ignore[arg-type]
-        assert refusal.value.parameter == [*given][-1]
+            truearm.iso9283_plan("irb120", criteria=["ap"], **options)  # type: ignore[arg-type]
+        assert refusal.value.parameter == [*options][-1]
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "words"),
     [
         ("side: 200", "side: 0", "side"),
         ("side: 200", "", "side"),
@@ -145,11 +145,11 @@ def test_a_cube_that_the_arm_cannot_reach_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_a_cube_that_cannot_be_used_is_refused_and_one_in_other_units_is_read(
-    old: str, new: str, said: str, tmp_path: Path
+    old: str, new: str, words: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "cube.yaml"
     path.write_text(CUBE.replace(old, new))
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=words):
         read_cube(path)
     path.write_text(CUBE.replace("mm", "m").replace("350", "0.35").replace("200", "0.2"))
     assert (read_cube(path).side, *read_cube(path).centre) == (0.2, 0.35, 0.0, 0.35)
@@ -161,7 +161,7 @@ def text() -> str:
 
 
 @pytest.mark.parametrize(
-    ("pattern", "new", "said"),
+    ("pattern", "new", "words"),
     [
         (r"name: P2,", "name: P1,", "two poses have this name"),
         (r"name: P1, position: \[350.0, ", "name: P1, position: [351.0, ", "do not bring the tip to the pose"),
@@ -191,7 +191,7 @@ def text() -> str:
     ],
 )
 def test_a_plan_file_that_cannot_be_used_is_refused(
-    pattern: str, new: str, said: str, text: str, tmp_path: Path
+    pattern: str, new: str, words: str, text: str, tmp_path: Path
 ) -> None:
     changed = re.sub(pattern, new, text, count=1, flags=re.M)
     assert changed != text
@@ -199,20 +199,20 @@ def test_a_plan_file_that_cannot_be_used_is_refused(
     (tmp_path / ROBOT).write_text(robot_text(small_plan(["AP"]).robot))
     with pytest.raises(InputError) as refusal:
         read_plan(tmp_path / PLAN)
-    assert said in str(refusal.value)
+    assert words in str(refusal.value)
 
 
 def test_the_largest_cube_is_that_of_the_robot_whichever_tests_are_planned(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = truearm.load_robot("irb120")
-    found = Cube([0.3036, 0.0, 0.3036], 0.4239)  # AP alone would be planned in it
-    monkeypatch.setattr("truearm.iso9283.planning.choosing.largest_cube", lambda *_, **__: found)
+    largest = Cube([0.3036, 0.0, 0.3036], 0.4239)  # AP alone would be planned in it
+    monkeypatch.setattr("truearm.iso9283.planning.choosing.largest_cube", lambda *_, **__: largest)
     sides = {
         tests: performance_plan(robot, tests=tests, rated_load=3.0, rated_velocity=1.0).cube.side
         for tests in (("AP",), ("AT", "vAP"))
     }
-    assert sides["AP",] == sides["AT", "vAP"] < found.side
-    alone = performance_plan(robot, tests=("AP",), cube=found, rated_load=3.0, rated_velocity=1.0)
-    assert alone.cube.side == found.side
+    assert sides["AP",] == sides["AT", "vAP"] < largest.side
+    alone = performance_plan(robot, tests=("AP",), cube=largest, rated_load=3.0, rated_velocity=1.0)
+    assert alone.cube.side == largest.side
 
 
 CELL = "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"
@@ -226,8 +226,8 @@ def rules(folder: Path, text: str) -> Constraints:
 
 
 def planned(cube: Path, **more: Any) -> Iso9283Plan:
-    given: dict[str, Any] = {"criteria": ["ap", "av"], "cube": cube, "velocity": 0.5, "tip": (0.0, 0.0, 0.05)}
-    return truearm.iso9283_plan("irb120", **(given | more))
+    options: dict[str, Any] = {"criteria": ["ap", "av"], "cube": cube, "velocity": 0.5, "tip": (0.0, 0.0, 0.05)}
+    return truearm.iso9283_plan("irb120", **(options | more))
 
 
 def cell_of(constraints: Constraints) -> StatedCell:
@@ -244,10 +244,10 @@ def test_ways_of_a_stated_cell_keep_clear_and_that_is_told(cube: Path, tmp_path:
     assert "mm or more from " in stated.kept
     assert all(thing in stated.kept for thing in ("the floor at 0 mm", "its own links"))
     assert stated.kept in stated.lines()
-    assert "ways-near" not in {one.code for one in stated.warnings}
+    assert "ways-near" not in {warning.code for warning in stated.warnings}
     assert stated.plan.robot.joints == alone.plan.robot.joints
-    room = float(stated.kept.partition(" mm or more")[0].rsplit(" ", 1)[1])
-    assert room >= 50.0
+    millimetres = float(stated.kept.partition(" mm or more")[0].rsplit(" ", 1)[1])
+    assert millimetres >= 50.0
 
 
 @pytest.mark.parametrize(
@@ -275,28 +275,28 @@ def test_ways_between_clear_poses_that_are_not_clear_are_named(cube: Path, tmp_p
     plan = planned(cube, tip=None).plan
     assert cell.unsuited(plan) == ""
     ways = cell_of(rules(tmp_path, "keep_out: {ball: {x: [330, 370], y: [-20, 20], z: [330, 370]}}\n"))
-    told = ways.unsuited(plan)
-    assert " ways are not clear (A" in told
-    assert "near the box 'ball', 0 mm" in told
-    assert "; and others; nearest " in told
+    message = ways.unsuited(plan)
+    assert " ways are not clear (A" in message
+    assert "near the box 'ball', 0 mm" in message
+    assert "; and others; nearest " in message
 
 
 def test_the_cube_is_chosen_where_the_ways_are_clear(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = Cube((0.35, 0.0, 0.35), 0.3)
     monkeypatch.setattr(planning, "largest_cube", lambda *_, **__: whole)
     robot = truearm.load_robot("irb120")
-    given: dict[str, Any] = {"tests": ["AP"], "rated_load": 3.0, "rated_velocity": 1.0}
+    options: dict[str, Any] = {"tests": ["AP"], "rated_load": 3.0, "rated_velocity": 1.0}
     monkeypatch.setattr(planning, "TESTS", {"AP": TESTS["AP"]})
-    anywhere = performance_plan(robot, **given)
+    anywhere = performance_plan(robot, **options)
     text = {"truearm": "truearm-constraints/1", "units": {"length": "mm", "angle": "deg"}}
     post = Constraints.model_validate(
         {**text, "keep_out": {"post": {"x": [450, 900], "y": [-500, 100], "z": [0, 150]}}}
     )
     cell = cell_of(post)
     assert cell.unclear(np.array([pose.joints for pose in anywhere.poses.values()]))
-    clear = performance_plan(robot, **given, unclear=cell.unclear, unsuited=cell.unsuited)
+    clear = performance_plan(robot, **options, unclear=cell.unclear, unsuited=cell.unsuited)
     assert not cell.unsuited(clear)
     assert clear.cube.side < anywhere.cube.side
     assert (np.abs(clear.cube.centre - whole.centre) + clear.cube.side / 2.0 <= whole.side / 2.0 + 1e-12).all()
     with pytest.raises(InputError, match="and keep clear; got 'missed: never"):
-        performance_plan(robot, **given, cube=clear.cube, unsuited=lambda _: "never")
+        performance_plan(robot, **options, cube=clear.cube, unsuited=lambda _: "never")

@@ -63,8 +63,8 @@ def holds(value: Value, truth: float) -> bool:
     return value.interval[0] < truth < value.interval[1]
 
 
-def found(values: tuple[Value, ...], id: str, component: str = "position", where: str | None = None) -> Value:
-    return next(v for v in values if v.id == id and v.component == component and where in (None, v.where))
+def value_of(values: tuple[Value, ...], id: str, component: str = "position", place: str | None = None) -> Value:
+    return next(v for v in values if v.id == id and v.component == component and place in (None, v.where))
 
 
 def campaign(seed: int = 0, n: int = 30) -> tuple[PerformancePlan, AttainedPoses]:
@@ -79,13 +79,13 @@ def campaign(seed: int = 0, n: int = 30) -> tuple[PerformancePlan, AttainedPoses
 def test_poses_on_a_circle_have_the_radius_as_repeatability() -> None:
     angle = 2 * np.pi * np.arange(30) / 30
     points = POINTS[0] + 2e-4 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + [0, 0, 5e-4]
-    made = evaluate(
+    result = evaluate(
         plan(PlannedTest("AP", ("P1",), 30)), rows("AP", ["P1"] * 30, [*range(1, 31)], points), TIE, TRACKER
     )
-    assert found(made.values, "RP").value == pytest.approx(2e-4, rel=1e-9)
-    assert found(made.values, "AP").value == pytest.approx(5e-4, rel=1e-9)
-    assert found(made.values, "AP", "a").status == "not-measured"
-    assert made.clouds[0].rp == found(made.values, "RP").value
+    assert value_of(result.values, "RP").value == pytest.approx(2e-4, rel=1e-9)
+    assert value_of(result.values, "AP").value == pytest.approx(5e-4, rel=1e-9)
+    assert value_of(result.values, "AP", "a").status == "not-measured"
+    assert result.clouds[0].rp == value_of(result.values, "RP").value
 
 
 def test_repeatability_of_printed_numbers() -> None:
@@ -113,7 +113,7 @@ def test_angles_are_means_and_three_deviations() -> None:
     vectors = cycles_of(task, read, TIE)[2].angles
     assert vectors is not None
     for k, (angle, true) in enumerate(zip("abc", (1e-3, -2e-3, 3e-3), strict=True)):
-        accuracy, spread = (found(values, id, angle, "P3") for id in ("AP", "RP"))
+        accuracy, spread = (value_of(values, id, angle, "P3") for id in ("AP", "RP"))
         assert accuracy.value == pytest.approx(true, abs=1e-4)
         assert holds(accuracy, true)
         assert spread.value == pytest.approx(3 * np.std(vectors[:, k], ddof=1), rel=1e-12)
@@ -126,16 +126,16 @@ def test_the_frame_of_the_instrument_does_not_matter() -> None:
     R, p = rotation_from_vector(np.array([0.3, -1.2, 0.8])), np.array([2.0, -1.0, 0.4])
     elsewhere = dataclasses.replace(read, position=(read.position - p) @ R, rotation=R.T @ read.rotation)
     tie = dataclasses.replace(TIE, T_base_instrument=Transform.from_matrix(R, p))
-    for one, two in zip(plain, evaluate(task, elsewhere, tie, TRACKER).values, strict=True):
-        assert (one.id, one.component, one.where) == (two.id, two.component, two.where)
-        assert one.value == pytest.approx(two.value, rel=1e-7, abs=1e-12)
-        assert one.interval == pytest.approx(two.interval, rel=1e-4, abs=1e-9)
+    for first, second in zip(plain, evaluate(task, elsewhere, tie, TRACKER).values, strict=True):
+        assert (first.id, first.component, first.where) == (second.id, second.component, second.where)
+        assert first.value == pytest.approx(second.value, rel=1e-7, abs=1e-12)
+        assert first.interval == pytest.approx(second.interval, rel=1e-4, abs=1e-9)
 
 
 def test_the_tie_widens_pose_accuracy_with_its_lever() -> None:
     task, read = campaign()
     coarse = dataclasses.replace(TIE, sigma=1e-4, sigma_rot=1e-4)
-    narrow, wide = (found(evaluate(task, read, tie, TRACKER).values, "AP").interval for tie in (TIE, coarse))
+    narrow, wide = (value_of(evaluate(task, read, tie, TRACKER).values, "AP").interval for tie in (TIE, coarse))
     assert narrow is not None
     assert wide is not None
     assert wide[1] - wide[0] > 2.5 * (narrow[1] - narrow[0])
@@ -148,7 +148,7 @@ def test_best_fit_hides_a_common_error_and_says_so() -> None:
     tie = best_fit_of(task, read)
     assert not tie.is_standard
     assert TIE.is_standard
-    assert found(evaluate(task, read, tie, TRACKER).values, "AP").value < 1e-4
+    assert value_of(evaluate(task, read, tie, TRACKER).values, "AP").value < 1e-4
     with pytest.raises(InputError, match="three poses or more"):
         best_fit_of(task, rows("AP", ["P1", "P2"], [1, 1], POINTS[:2]))
 
@@ -159,7 +159,7 @@ def test_variation_between_approaches() -> None:
     names = [name for name in offsets for _ in range(30)]
     points = POINTS[0] + np.array([offsets[name] for name in names]) + 1e-5 * rng.standard_normal((90, 3))
     task = plan(PlannedTest("vAP", ("P1",), 30, approaches=("x", "y", "z")))
-    value = found(
+    value = value_of(
         evaluate(task, rows("vAP", ["P1"] * 90, [*range(1, 31)] * 3, points, approach=names), TIE, TRACKER).values,
         "vAP",
     )
@@ -174,10 +174,10 @@ def test_distances_by_cycles_and_axes() -> None:
     ends = np.concatenate([POINTS[1] + 1e-7 * np.outer(wave, way), POINTS[3] + (2e-4 + wave)[:, None] * way])
     task = plan(PlannedTest("AD", ("P2", "P4"), 30))
     values = evaluate(task, rows("AD", ["P2"] * 30 + ["P4"] * 30, [*range(1, 31)] * 2, ends), TIE, TRACKER).values
-    assert found(values, "AD").value == pytest.approx(2e-4)
-    assert found(values, "AD").where == "P2-P4"
-    assert found(values, "RD").value == pytest.approx(3 * wave.std(ddof=1), rel=1e-6)
-    parts = [found(values, "AD", axis).value for axis in "xyz"]
+    assert value_of(values, "AD").value == pytest.approx(2e-4)
+    assert value_of(values, "AD").where == "P2-P4"
+    assert value_of(values, "RD").value == pytest.approx(3 * wave.std(ddof=1), rel=1e-6)
+    parts = [value_of(values, "AD", axis).value for axis in "xyz"]
     assert parts == pytest.approx(2e-4 * np.abs(way), abs=1e-12)
 
 
@@ -191,7 +191,7 @@ def test_exchanged_robots() -> None:
     points = np.array([POINTS[NAMES.index(name)] for name in pose]) + away + 1e-6 * rng.standard_normal((300, 3))
     task = plan(PlannedTest("E", ("P1", "P2"), 30))
     values = evaluate(task, rows("E", pose, [*range(1, 31)] * 10, points, robot=robots), TIE, TRACKER).values
-    assert [found(values, "E", where=where).value for where in ("P1", "P2", "all poses")] == pytest.approx(
+    assert [value_of(values, "E", place=place).value for place in ("P1", "P2", "all poses")] == pytest.approx(
         [4e-4, 8e-4, 8e-4], abs=2e-6
     )
     assert {value.status for value in values} == {"measured"}
@@ -204,11 +204,11 @@ def test_drift_by_groups_of_cycles() -> None:
     change = np.array([0, 1e-4, 3e-4, 2e-4])
     points = POINTS[0] + [1e-3, 0, 0] + 1e-6 * rng.standard_normal((40, 3)) + np.repeat(change, 10)[:, None] * [1, 0, 0]
     task, read = plan(PlannedTest("dAP", ("P1",), 10)), rows("dAP", ["P1"] * 40, [*range(1, 11)] * 4, points)
-    made = evaluate(task, read, TIE, TRACKER)
-    assert found(made.values, "dAP").value == pytest.approx(3e-4, abs=2e-6)
-    assert holds(found(made.values, "dAP"), 3e-4)
-    assert made.drift[0].ap - made.drift[0].ap[0] == pytest.approx(change, abs=2e-6)
-    assert found(made.values, "dRP").value < 1e-5
+    result = evaluate(task, read, TIE, TRACKER)
+    assert value_of(result.values, "dAP").value == pytest.approx(3e-4, abs=2e-6)
+    assert holds(value_of(result.values, "dAP"), 3e-4)
+    assert result.drift[0].ap - result.drift[0].ap[0] == pytest.approx(change, abs=2e-6)
+    assert value_of(result.values, "dRP").value < 1e-5
     times = 10.0 * np.arange(40) + np.repeat([0, 3600, 7200, 9000], 10)
     on = dataclasses.replace(read, cycle=np.arange(1, 41), time=times)
     assert [len(group) for group in groups_of(cycles_of(task, on, TIE)[0])] == [10, 10, 10, 10]
@@ -217,18 +217,18 @@ def test_drift_by_groups_of_cycles() -> None:
 def test_statuses() -> None:
     task, read = campaign(n=4)
     values = evaluate(task, read, TIE, TRACKER).values
-    few = found(values, "AP")
+    few = value_of(values, "AP")
     assert (few.status, few.interval, few.cycles) == ("too-few-cycles", None, 4)
     assert few.least is not None
     assert few.largest is not None
     assert few.least < few.value < few.largest
     task, read = campaign()
     values = evaluate(task, read, TIE, Instrument(3e-4, 1e-6)).values
-    assert (found(values, "AP").status, found(values, "RP").status) == ("instrument-too-coarse",) * 2
-    assert found(values, "AP", "c").status == "measured"
+    assert (value_of(values, "AP").status, value_of(values, "RP").status) == ("instrument-too-coarse",) * 2
+    assert value_of(values, "AP", "c").status == "measured"
     whole = plan(*(PlannedTest(id, ("P1", "P2"), 10) for id in ("AP", "vAP", "AD", "dAP", "E")))
-    rest = [v for v in evaluate(whole, rows("AP", ["P1"], [1], POINTS[:1]), TIE, TRACKER).values if v.where != "P1"]
-    assert {v.id for v in rest if v.status == "not-measured"} >= {"AP", "RP", "AD", "RD", "E", "dAP", "dRP", "vAP"}
+    others = [v for v in evaluate(whole, rows("AP", ["P1"], [1], POINTS[:1]), TIE, TRACKER).values if v.where != "P1"]
+    assert {v.id for v in others if v.status == "not-measured"} >= {"AP", "RP", "AD", "RD", "E", "dAP", "dRP", "vAP"}
 
 
 @pytest.mark.parametrize(
@@ -292,10 +292,10 @@ def test_an_outlying_push_is_named_and_no_other() -> None:
     position = noisy.position.copy()
     position[[40, 100]] += [[2e-4, 0, 0], [0, -1e-4, 0]]
     values, lines = evaluate_pushes(task, dataclasses.replace(noisy, position=position), TIE, TRACKER)
-    one, other = outlying_pushes(lines, TRACKER)
-    assert (one.line, one.direction, other.line, other.direction) == (42, "-x", 102, "-y")
-    assert (one.away, other.away) == pytest.approx((2e-4, 1e-4), rel=0.2)
-    for named in (one, other):
+    first, second = outlying_pushes(lines, TRACKER)
+    assert (first.line, first.direction, second.line, second.direction) == (42, "-x", 102, "-y")
+    assert (first.away, second.away) == pytest.approx((2e-4, 1e-4), rel=0.2)
+    for named in (first, second):
         value = next(v for v in values if v.where == named.direction)
         assert named.value == pytest.approx(value.value)
         assert named.without == pytest.approx(2e-6, rel=0.1)
@@ -311,12 +311,12 @@ def test_drift_from_a_first_group_at_its_command_is_within_its_interval() -> Non
     rng = np.random.default_rng(5)
     drift = 1e-4 * (1 - np.exp(-np.linspace(0, 3, 9)))
     task = plan(PlannedTest("dAP", ("P1",), 10))
-    held = []
+    within = []
     for _ in range(20):
         points = POINTS[0] + np.repeat(drift, 10)[:, None] * [1, 0, 0] + 1e-5 * rng.standard_normal((90, 3))
         values = evaluate(task, rows("dAP", ["P1"] * 90, [*range(1, 11)] * 9, points), TIE, TRACKER).values
-        held.append(holds(found(values, "dAP"), drift[-1]))
-    assert np.mean(held) >= 0.95
+        within.append(holds(value_of(values, "dAP"), drift[-1]))
+    assert np.mean(within) >= 0.95
 
 
 def test_pushes_that_cannot_be_used_are_refused() -> None:
@@ -343,7 +343,7 @@ def test_a_perfect_robot_is_seldom_called_inaccurate() -> None:
     rng = np.random.default_rng(11)
     points = rng.standard_normal((300, 30, 3)) * [3, 1, 0.3]
     intervals = [norm_interval(p.mean(axis=0), np.cov(p.T), 30, np.zeros((3, 3))) for p in points]
-    assert np.mean([one is not None and one[0] == 0.0 for one in intervals]) > 0.95
+    assert np.mean([interval is not None and interval[0] == 0.0 for interval in intervals]) > 0.95
 
 
 def test_a_tie_that_is_as_far_off_as_the_robot_leaves_drift_open() -> None:
@@ -353,21 +353,21 @@ def test_a_tie_that_is_as_far_off_as_the_robot_leaves_drift_open() -> None:
     off = true - [1e-4, 0.0, 0.0]  # what is read with a tie that is one of its deviations off
     task, read = plan(PlannedTest("dAP", ("P1",), 10)), rows("dAP", ["P1"] * 40, [*range(1, 11)] * 4, off)
     known = Alignment("base-features", Transform(), 1e-4, 1e-6)
-    low, high = found(evaluate(task, read, known, TRACKER).values, "dAP").interval or (1.0, 0.0)
+    low, high = value_of(evaluate(task, read, known, TRACKER).values, "dAP").interval or (1.0, 0.0)
     assert low < 9.5e-5 < high
     exact = Alignment("base-features", Transform(), 1e-9, 1e-9)
-    low, high = found(evaluate(task, read, exact, TRACKER).values, "dAP").interval or (0.0, 1.0)
+    low, high = value_of(evaluate(task, read, exact, TRACKER).values, "dAP").interval or (0.0, 1.0)
     assert high < 7e-5
 
 
 def test_poses_of_another_cube_are_told() -> None:
     def clouds(scale: float, shift: float, outlying: float = 0.0) -> tuple[PoseCloud, ...]:
         middle = POINTS.mean(axis=0)
-        made = []
+        of_poses = []
         for k, point in enumerate(POINTS):
             at = middle + scale * (point - middle) + np.array([shift, 0.0, outlying * (-1) ** k])
-            made.append(PoseCloud("AP", "", NAMES[k], "", 1.0, 1.0, point, at[None], at, 0.0))
-        return tuple(made)
+            of_poses.append(PoseCloud("AP", "", NAMES[k], "", 1.0, 1.0, point, at[None], at, 0.0))
+        return tuple(of_poses)
 
     side = 0.2
     larger = other_cube(clouds(1.02, 0.0), side)

@@ -19,8 +19,8 @@ from truearm.iso9283.planning.routes import SLOW_RUN
 
 
 def planned(cube: Path, **more: Any) -> Iso9283Plan:
-    given: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [100, 10], "velocity": 0.5, "load": 3.0}
-    return truearm.iso9283_plan(**({"robot": "irb120"} | given | more))
+    options: dict[str, Any] = {"criteria": ["av"], "cube": cube, "velocities": [100, 10], "velocity": 0.5, "load": 3.0}
+    return truearm.iso9283_plan(**({"robot": "irb120"} | options | more))
 
 
 @pytest.fixture(scope="module")
@@ -55,16 +55,16 @@ def test_faster_programs_are_written_once_the_slow_run_is_recorded(cube: Path, t
     assert "completed: no" in record.read_text()
     planned(cube, program="rapid", out=tmp_path)  # as long as nobody has filled it in it is written again
     filled(record)
-    said = record.read_text()
+    content = record.read_text()
     both = planned(cube, program="rapid", slow_run=record, out=tmp_path)
     assert both.programs is not None
     assert sorted(path.name for path in (tmp_path / "programs").iterdir()) == ["AV_10.mod", "AV_100.mod"]
     assert "2 measuring programs in RAPID, at every velocity." in both.lines()
-    assert record.read_text() == said
+    assert record.read_text() == content
     assert "[500,500,5000,1000]" in (tmp_path / "programs" / "AV_100.mod").read_text()
     with pytest.raises(InputError, match="somebody has filled in this record of a slow run, and it would be lost"):
         planned(cube, program="rapid", out=tmp_path)
-    assert record.read_text() == said
+    assert record.read_text() == content
 
 
 @pytest.mark.parametrize(
@@ -96,8 +96,8 @@ def test_a_slow_run_that_says_too_little_or_something_else_is_refused(
 
 def test_a_language_of_another_maker_and_speeds_that_it_does_not_say_are_told(cube: Path) -> None:
     def notices(language: str, **more: Any) -> list[Notice]:
-        told = planned(cube, program=language, **more).warnings
-        return [one for one in told if one.code in ("maker", "joint-speed-assumed")]
+        warnings = planned(cube, program=language, **more).warnings
+        return [warning for warning in warnings if warning.code in ("maker", "joint-speed-assumed")]
 
     (speed,) = notices("rapid")
     assert (speed.code, speed.level) == ("joint-speed-assumed", "note")
@@ -106,29 +106,31 @@ def test_a_language_of_another_maker_and_speeds_that_it_does_not_say_are_told(cu
     assert (maker.code, maker.level, speed.code) == ("maker", "warning", "joint-speed-assumed")
     assert "programs were written in URScript." in maker.message
     assert "the leading joint goes so fast that one joint has the share" in speed.message
-    assert [one.code for one in notices("fanuc")] == ["maker"]
+    assert [notice.code for notice in notices("fanuc")] == ["maker"]
     robot = truearm.load_robot("irb120")
     robot = replace(robot, maker="", joints=tuple(replace(joint, max_speed=None) for joint in robot.joints))
-    for language, said in (("krl", "the tip keeps to 250 mm/s"), ("urscript", "100 % is taken for 120 deg/s")):
+    for language, words in (("krl", "the tip keeps to 250 mm/s"), ("urscript", "100 % is taken for 120 deg/s")):
         *_, speed = notices(language, robot=robot)
-        assert (speed.code, said in speed.message) == ("joint-speed-assumed", True), language
+        assert (speed.code, words in speed.message) == ("joint-speed-assumed", True), language
 
 
 def test_programs_of_a_controller_whose_counting_is_not_known_say_so_or_are_refused(cube: Path) -> None:
     robot = replace(truearm.load_robot("irb120"), controller=Controller(), maker="")
-    given: dict[str, Any] = {"criteria": ["ap"], "velocities": (100, 50, 10), "velocity": None}
-    with pytest.raises(InputError, match="controllers that run FANUC LS count joint 3 together with joint 2") as found:
-        planned(cube, robot=robot, program="fanuc", **given)
-    assert found.value.parameter == "program"
+    options: dict[str, Any] = {"criteria": ["ap"], "velocities": (100, 50, 10), "velocity": None}
+    with pytest.raises(
+        InputError, match="controllers that run FANUC LS count joint 3 together with joint 2"
+    ) as refusal:
+        planned(cube, robot=robot, program="fanuc", **options)
+    assert refusal.value.parameter == "program"
     for language in ("rapid", "krl", "urscript", "val3"):
-        made = planned(cube, robot=robot, program=language, **given)
-        (told,) = [one for one in made.warnings if one.code == "controller-counts-assumed"]
-        assert told.level == "warning"
-        assert made.programs is not None
-        assert any("compare joints with the pendant" in text for text in made.programs.files.values())
-        assert told.message.partition(":")[0] in made.contents()["sheet.html"]
+        result = planned(cube, robot=robot, program=language, **options)
+        (assumed,) = [warning for warning in result.warnings if warning.code == "controller-counts-assumed"]
+        assert assumed.level == "warning"
+        assert result.programs is not None
+        assert any("compare joints with the pendant" in text for text in result.programs.files.values())
+        assert assumed.message.partition(":")[0] in result.contents()["sheet.html"]
     counted = replace(robot, controller=Controller(source="the pendant shows the model's joints"))
-    known = planned(cube, robot=counted, program="fanuc", **given).programs
+    known = planned(cube, robot=counted, program="fanuc", **options).programs
     assert known is not None
     assert not any("compare joints" in text for text in known.files.values())
 
@@ -171,9 +173,9 @@ def test_a_program_of_somebody_else_is_not_overwritten(cube: Path, tmp_path: Pat
 def test_ways_that_come_near_the_floor_are_told(cube: Path, tmp_path: Path) -> None:
     low = tmp_path / "low.yaml"
     low.write_text(CUBE.replace("0, 350]", "0, 150]"))
-    given: dict[str, Any] = {"criteria": ["ap", "av"], "program": "rapid", "tip": (0.0, 0.0, 0.05)}
-    assert not [one for one in planned(cube, **given).warnings if one.code == "ways-near"]
-    (told,) = [one for one in planned(low, **given).warnings if one.code == "ways-near"]
-    assert told.level == "warning"
-    assert "ways the arm comes within 50 mm of the floor or of itself, nearest on A" in told.message
-    assert "near the floor, " in told.message
+    options: dict[str, Any] = {"criteria": ["ap", "av"], "program": "rapid", "tip": (0.0, 0.0, 0.05)}
+    assert not [warning for warning in planned(cube, **options).warnings if warning.code == "ways-near"]
+    (near,) = [warning for warning in planned(low, **options).warnings if warning.code == "ways-near"]
+    assert near.level == "warning"
+    assert "ways the arm comes within 50 mm of the floor or of itself, nearest on A" in near.message
+    assert "near the floor, " in near.message

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.iso9283.known_motions import PLAN, cornering, found, said
+from tests.iso9283.known_motions import PLAN, cornering, evaluation_of, notices_of
 from tests.moving_tip import ALONG, CENTRE, HERE, along, duration_of, plan_of, ramp, samples_of, the, times
 
 from truearm.engine.base.errors import InputError
@@ -18,10 +18,10 @@ from truearm.iso9283.criteria.runs import outlying_steps, refuse_outlying
 from truearm.iso9283.criteria.settling import settling_values
 from truearm.iso9283.criteria.streams import clock_of
 from truearm.iso9283.criteria.velocity import velocity_values
+from truearm.iso9283.evaluating.data_notices import rounding_notices
 from truearm.iso9283.evaluating.doubts import unusual_samples
 from truearm.iso9283.evaluating.reading import read_attained_poses
 from truearm.iso9283.evaluating.samples import read_settling_samples
-from truearm.iso9283.evaluating.told import said_of_rounding
 from truearm.iso9283.planning.criteria import Way
 from truearm.iso9283.planning.records import Samples, resolution_of
 
@@ -73,7 +73,7 @@ def test_velocity_from_rounded_times_is_that_from_exact_ones(rate: float, resolu
     rounded, curves = velocity_values(FAST, on_the_line(rate, resolution), HERE, Instrument(1e-5))
     assert the(rounded, "FV").value == pytest.approx(the(exact, "FV").value, rel=0.35, abs=1e-3)
     assert the(rounded, "AV").value == pytest.approx(the(exact, "AV").value, abs=2e-3)
-    (notice,) = said_of_rounding(found(velocities=tuple(curves)), Instrument(1e-5))
+    (notice,) = rounding_notices(evaluation_of(velocities=tuple(curves)), Instrument(1e-5))
     assert (notice.code, notice.level) == ("times-rounded", "note")
     assert "AV on line" in notice.message
     assert "on an even clock" in notice.message
@@ -82,13 +82,13 @@ def test_velocity_from_rounded_times_is_that_from_exact_ones(rate: float, resolu
 def test_velocity_from_rounded_times_of_an_uneven_clock_is_marked() -> None:
     values, curves = velocity_values(FAST, on_the_line(240.0, 1e-3, 4e-4), HERE, Instrument(1e-5))
     assert the(values, "FV").status == the(values, "RV").status == "instrument-too-coarse"
-    (notice,) = said_of_rounding(found(velocities=tuple(curves)), Instrument(1e-5))
+    (notice,) = rounding_notices(evaluation_of(velocities=tuple(curves)), Instrument(1e-5))
     assert "no even clock fits" in notice.message
 
 
 def test_times_with_enough_decimals_are_no_matter() -> None:
     _, curves = velocity_values(FAST, on_the_line(240.0, 1e-6), HERE, Instrument(1e-5))
-    assert said_of_rounding(found(velocities=tuple(curves)), Instrument(1e-5)) == ()
+    assert rounding_notices(evaluation_of(velocities=tuple(curves)), Instrument(1e-5)) == ()
 
 
 def test_times_too_coarse_to_say_how_fast_the_tip_is_are_refused_as_such() -> None:
@@ -122,12 +122,12 @@ def test_times_that_are_the_same_by_rounding_are_not_called_written_twice(tmp_pa
 
 def test_the_step_of_rounded_numbers_is_found() -> None:
     rng = np.random.default_rng(7)
-    one = np.zeros(60, dtype=np.intp)
+    one_group = np.zeros(60, dtype=np.intp)
     numbers = 350.0 + rng.normal(0.0, 0.02, (60, 3))
-    assert resolution_of(numbers, one) == 0.0
+    assert resolution_of(numbers, one_group) == 0.0
     for step in (0.1, 0.01, 0.005, 0.0001):
-        assert resolution_of(np.round(numbers / step) * step, one) == pytest.approx(step)
-    assert resolution_of(np.tile([[350.0, 0.0, 350.0]], (60, 1)), one) == 0.0
+        assert resolution_of(np.round(numbers / step) * step, one_group) == pytest.approx(step)
+    assert resolution_of(np.tile([[350.0, 0.0, 350.0]], (60, 1)), one_group) == 0.0
     groups = np.arange(60) % 2
     assert resolution_of(np.column_stack([100.0 * groups, 200.0 * groups]), groups) == 0.0
 
@@ -155,11 +155,11 @@ def test_files_know_to_what_their_readings_were_rounded(tmp_path: Path) -> None:
     reading = instrument.reading(read.resolution, read.resolution_rot)
     assert reading.sigma == pytest.approx(1e-5 / np.sqrt(12))
     assert reading.sigma_rot == pytest.approx(2e-4 / np.sqrt(12))
-    (notice,) = said_of_rounding(found(readings={"poses": reading}), instrument)
+    (notice,) = rounding_notices(evaluation_of(readings={"poses": reading}), instrument)
     assert (notice.code, notice.level) == ("readings-rounded", "note")
     assert "positions of poses to 0.01 mm" in notice.message
     assert "quaternions of poses to 0.0001 " in notice.message
-    assert said_of_rounding(found(readings={"poses": reading}), Instrument(1e-5, 1e-4)) == ()
+    assert rounding_notices(evaluation_of(readings={"poses": reading}), Instrument(1e-5, 1e-4)) == ()
 
 
 def resting(seed: int, step: float) -> Samples:
@@ -179,7 +179,7 @@ def test_the_last_digit_of_a_rounded_record_is_nothing_unusual() -> None:
         samples = resting(seed, 1e-5)
         _, curves = settling_values(PLAN, samples, HERE, Instrument(1e-5))
         readings = {"settling": Instrument(1e-5).reading(samples.resolution)}
-        assert "unusual-samples" not in said(settling=tuple(curves), readings=readings), seed
+        assert "unusual-samples" not in notices_of(settling=tuple(curves), readings=readings), seed
 
 
 # -- a corner that is an arc ---------------------------------------------------------------------------
@@ -189,10 +189,10 @@ def test_arcs_round_corners_have_no_unusual_samples_and_a_spike_beside_them_has(
     for seed in range(6):
         samples = cornering(0.02, plan=FAST, rate=1000.0, sigma=5e-6, seed=seed, apart=0.37)
         _, corners = corner_values(FAST, samples, HERE, Instrument(5e-6))
-        assert "unusual-samples" not in said(corners=tuple(corners)), seed
+        assert "unusual-samples" not in notices_of(corners=tuple(corners)), seed
     cycles = corners[0].run.cycles
     moved = [cycle.position.copy() for cycle in cycles]
     row = int(np.searchsorted(cycles[1].along, 0.1))
     moved[1][row] += 4e-4
-    (one,) = unusual_samples([c.time for c in cycles], moved, [c.along for c in cycles])
-    assert (one.cycle, one.sample) == (1, row)
+    (unusual,) = unusual_samples([c.time for c in cycles], moved, [c.along for c in cycles])
+    assert (unusual.cycle, unusual.sample) == (1, row)

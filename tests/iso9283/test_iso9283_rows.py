@@ -93,14 +93,14 @@ def in_order(read: AttainedPoses, order: Rows) -> AttainedPoses:
 
 def rows_of(read: AttainedPoses, **named: Any) -> Rows:
     """Return which rows are of a test, pose, cycle .."""
-    here = np.ones(len(read.cycle), dtype=bool)
+    chosen = np.ones(len(read.cycle), dtype=bool)
     for name, value in named.items():
         column = getattr(read, name)
-        here &= column.are(str(value)) if isinstance(column, Names) else column == value
-    return np.flatnonzero(here)
+        chosen &= column.are(str(value)) if isinstance(column, Names) else column == value
+    return np.flatnonzero(chosen)
 
 
-def found(plan: PerformancePlan, read: AttainedPoses, tie: Alignment | None = TIE) -> Evaluation:
+def evaluation_of(plan: PerformancePlan, read: AttainedPoses, tie: Alignment | None = TIE) -> Evaluation:
     return evaluated(plan, Measurements(poses=read), tie, TRACKER)
 
 
@@ -117,25 +117,25 @@ def moved(read: AttainedPoses, rows: Rows, by: Array | list[float]) -> AttainedP
 @pytest.mark.parametrize("tie", [TIE, None], ids=["tied", "best fit"])
 def test_no_figure_depends_on_the_order_of_the_rows(tie: Alignment | None) -> None:
     plan, read = campaign()
-    plain = found(plan, read, tie).values
+    plain = evaluation_of(plan, read, tie).values
     assert {value.id for value in plain} == {"AP", "RP", "vAP", "AD", "RD", "dAP", "dRP", "E"}
     rng = np.random.default_rng(3)
     for order in (np.arange(len(read.cycle))[::-1], rng.permutation(len(read.cycle))):
-        other = found(plan, in_order(read, order), tie).values
-        for one, two in zip(plain, other, strict=True):
-            assert one == two or math.isnan(one.value)
-            assert (one.id, one.component, one.where) == (two.id, two.component, two.where)
+        other = evaluation_of(plan, in_order(read, order), tie).values
+        for first, second in zip(plain, other, strict=True):
+            assert first == second or math.isnan(first.value)
+            assert (first.id, first.component, first.where) == (second.id, second.component, second.where)
 
 
 def test_clean_campaigns_are_silent() -> None:
     plan, read = campaign()
     rng = np.random.default_rng(8)
     for _ in range(20):
-        made = unusual(
+        rows = unusual(
             plan, moved(read, np.arange(len(read.cycle)), SCATTER * rng.standard_normal(read.position.shape))
         )
-        assert (made.outlying, made.two_places) == ((), ())
-    assert found(plan, read).missing == ()
+        assert (rows.outlying, rows.two_places) == ((), ())
+    assert evaluation_of(plan, read).missing == ()
 
 
 @pytest.mark.parametrize(
@@ -144,15 +144,15 @@ def test_clean_campaigns_are_silent() -> None:
 )
 def test_an_outlying_row_is_named_with_what_it_changes(test: str, criteria: tuple[str, ...]) -> None:
     plan, read = campaign(1, (test,))
-    where: dict[str, dict[str, Any]] = {
+    conditions: dict[str, dict[str, Any]] = {
         "AP": {"pose": "P3", "velocity": 0.5},
         "AD": {"pose": "P4"},
         "E": {"pose": "P2", "robot": "r3"},
     }
-    of: dict[str, Any] = {"criterion": test, "cycle": 4} | where.get(test, {})
+    of: dict[str, Any] = {"criterion": test, "cycle": 4} | conditions.get(test, {})
     row = int(rows_of(read, **of)[0])
     spoilt = moved(read, np.array([row]), [0, 5e-3, 0])
-    (outlying,) = found(plan, spoilt).unusual.outlying
+    (outlying,) = evaluation_of(plan, spoilt).unusual.outlying
     assert (outlying.of.test, outlying.kind, int(outlying.of.cycle[0]), int(outlying.of.line[0])) == (
         test,
         "position",
@@ -163,7 +163,11 @@ def test_an_outlying_row_is_named_with_what_it_changes(test: str, criteria: tupl
     assert {value.id for value, _ in outlying.changes} == {*criteria}
     assert np.isfinite([other.value for _, other in outlying.changes]).all()
     if test == "AP":
-        clean = {(v.id, v.where, v.conditions): v.value for v in found(plan, read).values if v.component == "position"}
+        clean = {
+            (v.id, v.where, v.conditions): v.value
+            for v in evaluation_of(plan, read).values
+            if v.component == "position"
+        }
         for value, without in outlying.changes:
             assert without.value == pytest.approx(clean[value.id, value.where, value.conditions], rel=0.2)
             assert without.cycles == value.cycles - 1
@@ -179,7 +183,7 @@ def test_an_outlying_orientation_is_named() -> None:
     assert read.rotation is not None
     rotation = read.rotation.copy()
     rotation[row] = rotation_from_vector(np.array([0, 0.02, 0])) @ rotation[row]
-    (outlying,) = found(plan, dataclasses.replace(read, rotation=rotation)).unusual.outlying
+    (outlying,) = evaluation_of(plan, dataclasses.replace(read, rotation=rotation)).unusual.outlying
     assert (outlying.kind, int(outlying.of.line[0])) == ("orientation", row + 2)
     assert outlying.away == pytest.approx(0.02, rel=0.1)
     assert outlying.changes[0][0].component == "b"
@@ -189,7 +193,7 @@ def test_several_outlying_rows_are_named_and_ten_times_the_scatter_is_enough() -
     plan, read = campaign(2, ("AP",))
     rows = np.array([rows_of(read, pose=f"P{k}", cycle=7)[0] for k in (1, 3, 5)])
     away = 10 * math.sqrt(3) * SCATTER * np.array([[1, 0, 0], [0, -1, 0], [0, 0.6, 0.8]])
-    assert {int(one.of.line[0]) for one in unusual(plan, moved(read, rows, away)).outlying} == {*(rows + 2)}
+    assert {int(row.of.line[0]) for row in unusual(plan, moved(read, rows, away)).outlying} == {*(rows + 2)}
 
 
 def test_three_cycles_of_a_pose_have_a_outlying_row_where_others_show_the_scatter() -> None:
@@ -204,9 +208,9 @@ def test_three_cycles_of_a_pose_have_a_outlying_row_where_others_show_the_scatte
 def test_two_places_of_rest_are_told_and_their_rows_are_not_outlying() -> None:
     plan, read = campaign(4, ("AP",))
     rows = np.concatenate([rows_of(read, pose="P2", velocity=1.0, cycle=c) for c in (3, 4, 9, 15, 20, 21, 27)])
-    made = unusual(plan, moved(read, rows, [0, 15 * SCATTER, 0]))
-    (places,) = made.two_places
-    assert (places.of.pose, places.rows, made.outlying) == ("P2", (7, 23), ())
+    result = unusual(plan, moved(read, rows, [0, 15 * SCATTER, 0]))
+    (places,) = result.two_places
+    assert (places.of.pose, places.rows, result.outlying) == ("P2", (7, 23), ())
     assert places.apart == pytest.approx(15 * SCATTER, rel=0.1)
     assert places.lines == tuple(sorted(read.line[rows].tolist()))
 
@@ -215,10 +219,10 @@ def test_rows_of_several_groups_that_are_off_alike_are_a_second_place() -> None:
     plan, read = campaign(4, ("dAP",))
     plan = dataclasses.replace(plan, tests=tuple(dataclasses.replace(t, cycles=6) for t in plan.tests))
     rows = np.array([rows_of(read, time=1e4 * group + 3)[0] for group in (0, 1, 3)])
-    made = unusual(plan, moved(read, rows, [0, 40 * SCATTER, 0]))
-    assert (len(made.two_places), made.outlying) == (1, ())
-    assert made.two_places[0].rows == (3, 21)
-    assert made.two_places[0].lines == tuple(read.line[rows].tolist())
+    result = unusual(plan, moved(read, rows, [0, 40 * SCATTER, 0]))
+    assert (len(result.two_places), result.outlying) == (1, ())
+    assert result.two_places[0].rows == (3, 21)
+    assert result.two_places[0].lines == tuple(read.line[rows].tolist())
 
 
 def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> AttainedPoses:
@@ -246,7 +250,7 @@ def changed(read: AttainedPoses, name: str, row: int, value: float | str) -> Att
 def test_rows_under_conditions_that_were_not_planned_are_refused(column: str, value: float | str, text: str) -> None:
     plan, read = campaign(1, ("AP",))
     with pytest.raises(InputError, match=re.escape(text)):
-        found(plan, changed(read, column, 3, value))
+        evaluation_of(plan, changed(read, column, 3, value))
 
 
 def test_rounded_velocities_are_those_of_the_plan() -> None:
@@ -254,59 +258,63 @@ def test_rounded_velocities_are_those_of_the_plan() -> None:
     third = dataclasses.replace(plan.tests[0], velocities=(1.0, 1 / 3))
     plan = dataclasses.replace(plan, tests=(third,))
     read = dataclasses.replace(read, velocity=np.where(read.velocity == 1.0, 1.0 + 1e-9, 0.3333))
-    assert {value.conditions.velocity for value in found(plan, read).values} == {1.0, 1 / 3}
+    assert {value.conditions.velocity for value in evaluation_of(plan, read).values} == {1.0, 1 / 3}
 
 
 def test_a_robot_with_a_few_rows_alone_is_refused() -> None:
     plan, read = campaign(1, ("E",))
     with pytest.raises(InputError, match="the robot r11 has few rows in the test E: 1, where r1 has 30"):
-        found(plan, changed(read, "robot", 0, "r11"))
-    kept = np.setdiff1d(np.arange(len(read.cycle)), rows_of(read, robot="r0")[20:])
-    assert found(plan, in_order(read, kept)).missing == ("E: P5 of r0",)
+        evaluation_of(plan, changed(read, "robot", 0, "r11"))
+    remaining = np.setdiff1d(np.arange(len(read.cycle)), rows_of(read, robot="r0")[20:])
+    assert evaluation_of(plan, in_order(read, remaining)).missing == ("E: P5 of r0",)
 
 
 def test_a_row_that_was_copied_is_refused() -> None:
     plan, read = campaign(1, ("AP",))
     read = dataclasses.replace(read, time=np.arange(len(read.cycle), dtype=float))
-    one, other = (int(rows_of(read, pose="P2", velocity=1.0, cycle=cycle)[0]) for cycle in (4, 5))
+    first, second = (int(rows_of(read, pose="P2", velocity=1.0, cycle=cycle)[0]) for cycle in (4, 5))
     copied = changed(
-        moved(read, np.array([other]), read.position[one] - read.position[other]), "time", other, read.time[one]
+        moved(read, np.array([second]), read.position[first] - read.position[second]), "time", second, read.time[first]
     )
-    copied.position[other] = copied.position[one]
-    with pytest.raises(InputError, match=f"lines {one + 2} and {other + 2}: 1 row with the time and the place"):
-        found(plan, copied)
+    copied.position[second] = copied.position[first]
+    with pytest.raises(InputError, match=f"lines {first + 2} and {second + 2}: 1 row with the time and the place"):
+        evaluation_of(plan, copied)
 
 
 def test_two_cycles_with_one_position_are_copies_unless_readings_are_rounded() -> None:
     plan, read = campaign(1, ("AP",))
-    one, other = (int(rows_of(read, pose="P2", velocity=1.0, cycle=cycle)[0]) for cycle in (4, 5))
-    copied = moved(read, np.array([other]), np.zeros(3))
-    copied.position[other] = copied.position[one]
-    with pytest.raises(InputError, match=f"lines {one + 2} and {other + 2}: 1 row with the position of another cycle"):
-        found(plan, copied)
-    held = dataclasses.replace(read, position=read.position.copy())
+    first, second = (int(rows_of(read, pose="P2", velocity=1.0, cycle=cycle)[0]) for cycle in (4, 5))
+    copied = moved(read, np.array([second]), np.zeros(3))
+    copied.position[second] = copied.position[first]
+    with pytest.raises(
+        InputError, match=f"lines {first + 2} and {second + 2}: 1 row with the position of another cycle"
+    ):
+        evaluation_of(plan, copied)
+    repeated = dataclasses.replace(read, position=read.position.copy())
     rows = rows_of(read, pose="P2", velocity=1.0)
-    held.position[rows] = held.position[rows[0]]
+    repeated.position[rows] = repeated.position[rows[0]]
     with pytest.raises(InputError, match=f"{len(rows) - 1} rows with the position of another cycle of the same pose"):
-        found(plan, held)
+        evaluation_of(plan, repeated)
     rounded = dataclasses.replace(read, position=np.round(read.position, 5))
     assert len(np.unique(rounded.position, axis=0)) < len(rounded.position)
     refuse_copied_poses(rounded)
-    refuse_copied_poses(dataclasses.replace(held, position=held.position[rows[0]] + np.zeros_like(held.position)))
+    refuse_copied_poses(
+        dataclasses.replace(repeated, position=repeated.position[rows[0]] + np.zeros_like(repeated.position))
+    )
 
 
 def test_two_poses_that_were_swapped_are_refused() -> None:
     plan, read = campaign(1, ("AD",))
     position = read.position.copy()
-    one, other = (rows_of(read, pose=pose) for pose in ("P2", "P4"))
-    position[one], position[other] = position[other], position[one]
+    first, second = (rows_of(read, pose=pose) for pose in ("P2", "P4"))
+    position[first], position[second] = position[second], position[first]
     with pytest.raises(InputError, match=rf"{len(position)} poses at another place than the plan has it"):
-        found(plan, dataclasses.replace(read, position=position))
+        evaluation_of(plan, dataclasses.replace(read, position=position))
     position = read.position.copy()
     pair = [int(rows_of(read, pose=pose, cycle=5, velocity=1.0)[0]) for pose in ("P2", "P4")]
     position[pair] = position[pair[::-1]]
     with pytest.raises(InputError, match=rf"line {min(pair) + 2}, column pose: 2 poses at another place") as refusal:
-        found(plan, dataclasses.replace(read, position=position))
+        evaluation_of(plan, dataclasses.replace(read, position=position))
     assert re.search(rf"got 'P., and it lies at P.,.*; so also line {max(pair) + 2}'", str(refusal.value))
 
 
@@ -316,10 +324,10 @@ def test_quaternions_in_another_order_are_refused() -> None:
     tilt = rotation_from_vector(np.array([0.4, 0.5, -0.3]))
     tie = dataclasses.replace(TIE, T_base_instrument=Transform.from_matrix(tilt, np.zeros(3)))
     turned = dataclasses.replace(read, position=read.position @ tilt, rotation=tilt.T @ read.rotation)
-    assert len(found(plan, turned, tie).values) > 50
+    assert len(evaluation_of(plan, turned, tie).values) > 50
     wrong = rotation_from_quaternion(np.roll(quaternion_from_rotation(tilt.T @ read.rotation), -1, axis=1))
     with pytest.raises(InputError, match="in the order x, y, z, w"):
-        found(plan, dataclasses.replace(turned, rotation=wrong), tie)
+        evaluation_of(plan, dataclasses.replace(turned, rotation=wrong), tie)
 
 
 def test_places_without_a_row_are_told() -> None:
@@ -330,9 +338,9 @@ def test_places_without_a_row_are_told() -> None:
         rows_of(read, criterion="vAP", pose="P2", approach="y"),
         rows_of(read, criterion="E", robot="r2"),
     ]
-    kept = np.setdiff1d(np.arange(len(read.cycle)), np.concatenate(drop))
-    made = found(plan, in_order(read, kept))
-    assert made.missing == ("AP: P3", "AP: P4 at 100 %", "vAP: P2 from y", "E: 1 of 5 robots")
+    remaining = np.setdiff1d(np.arange(len(read.cycle)), np.concatenate(drop))
+    result = evaluation_of(plan, in_order(read, remaining))
+    assert result.missing == ("AP: P3", "AP: P4 at 100 %", "vAP: P2 from y", "E: 1 of 5 robots")
 
 
 def group(points: Array, pose: str = "P1", test: str = "AP") -> Cycles:
@@ -346,38 +354,38 @@ def group(points: Array, pose: str = "P1", test: str = "AP") -> Cycles:
 def creeping_campaign(rng: np.random.Generator, share: float, common: float = 0.0, test: str = "AP") -> list[Cycles]:
     """Return five poses of thirty cycles; each is a share of the one before, and moves with the others by an amount."""
     together = common * rng.standard_normal((30, 3))
-    made = []
+    groups = []
     for k in range(1, 6):
         points = rng.standard_normal((30, 3)) * [3.0, 1.0, 0.3] + together
         for row in range(1, 30):
             points[row] = share * points[row - 1] + np.sqrt(1 - share**2) * points[row]
-        made.append(group(points, f"P{k}", test))
-    return made
+        groups.append(group(points, f"P{k}", test))
+    return groups
 
 
 def test_cycles_that_creep_are_said_with_their_correlation() -> None:
     rng = np.random.default_rng(0)
     unusual = unusual_rows(creeping_campaign(rng, 0.8), Instrument(1e-6))
-    (one,) = unusual.alike
-    assert 0.5 < one.correlation < 0.95
-    found = Evaluation((), Alignment.__new__(Alignment), unusual=unusual)
-    (notice,) = (notice for notice in row_notices(found) if notice.code == "cycles-alike")
+    (alike,) = unusual.alike
+    assert 0.5 < alike.correlation < 0.95
+    evaluation = Evaluation((), Alignment.__new__(Alignment), unusual=unusual)
+    (notice,) = (notice for notice in row_notices(evaluation) if notice.code == "cycles-alike")
     assert notice.level == "warning"
-    assert f"AP, 100 %, load 100 % (correlation {one.correlation:.2f}" in notice.message
+    assert f"AP, 100 %, load 100 % (correlation {alike.correlation:.2f}" in notice.message
 
 
 def test_independent_cycles_are_seldom_said_even_if_all_poses_move_together() -> None:
     rng = np.random.default_rng(1)
     for common in (0.0, 3.0):
-        said = sum(bool(alike_cycles(creeping_campaign(rng, 0.0, common))) for _ in range(300))
-        assert said <= 8  # 1 %, and what chance adds to it
+        alarms = sum(bool(alike_cycles(creeping_campaign(rng, 0.0, common))) for _ in range(300))
+        assert alarms <= 8  # 1 %, and what chance adds to it
 
 
 def test_few_cycles_drift_and_points_without_scatter_are_not_judged() -> None:
     rng = np.random.default_rng(2)
     creeping = creeping_campaign(rng, 0.9)
-    assert alike_cycles([one.rows(slice(0, 9)) for one in creeping]) == ()
-    assert alike_cycles([replace(one, test="dAP") for one in creeping]) == ()
+    assert alike_cycles([cycles.rows(slice(0, 9)) for cycles in creeping]) == ()
+    assert alike_cycles([replace(cycles, test="dAP") for cycles in creeping]) == ()
     assert alike_cycles([group(np.ones((30, 3)))]) == ()
     # cycles that only some poses have are left aside
     assert len(alike_cycles([creeping[0].rows(slice(3, None)), *creeping[1:]])) == 1

@@ -94,8 +94,8 @@ def test_orientations_are_compared_with_those_that_alternate_along_the_line() ->
     samples = samples_of("AT-reorientation", "line", rows, [R] * 10)
     values, (record,) = path_values(PLAN, samples, HERE, EXACT, "AT-reorientation")
     assert record.angles is not None
-    found = [the(values, "AT-reorientation", angle).value for angle in "abc"]
-    assert found == pytest.approx(np.abs(off), rel=1e-3)
+    accuracies = [the(values, "AT-reorientation", angle).value for angle in "abc"]
+    assert accuracies == pytest.approx(np.abs(off), rel=1e-3)
     with pytest.raises(InputError, match=r"line 2: the samples have no orientations"):
         path_values(PLAN, replace(samples, rotation=None), HERE, EXACT, "AT-reorientation")
 
@@ -126,11 +126,11 @@ def test_cycles_dwells_and_the_deviation_are_found_in_a_stream(name: str, rate: 
 
     t, p, truth = stream_of(PLAN, name, rate, rng, cycles=10, offset=aside, velocity=V)
     values, (record,) = path_values(PLAN, samples_of("AT", name, [(0, t, p)]), HERE, TRACKER)
-    found = record.run.found
-    assert found is not None
+    stream = record.run.stream
+    assert stream is not None
     motions = 20 if name == "line" else 10
-    assert (len(found.cycles), len(found.motions), len(found.dwells)) == (10, motions, motions + 1)
-    ends = np.array([[t[first], t[last]] for first, last in found.cycles])
+    assert (len(stream.cycles), len(stream.motions), len(stream.dwells)) == (10, motions, motions + 1)
+    ends = np.array([[t[first], t[last]] for first, last in stream.cycles])
     assert ends == pytest.approx(np.array(truth), abs=0.15)
     assert the(values, "AT").value == pytest.approx(4e-4, rel=0.05)
     for cycle in record.run.cycles:
@@ -292,18 +292,20 @@ def test_an_overshoot_is_the_height_beyond_the_second_side() -> None:
 @pytest.mark.parametrize("beyond", [0.1e-3, 0.5e-3])
 def test_noise_makes_an_overshoot_of_a_corner_little_larger(beyond: float) -> None:
     values, _ = corner_values(PLAN, cornering(0.0, beyond, sigma=1e-5), HERE, Instrument(1e-5))
-    found = [value for value in values if value.id == "CO"]
-    assert np.mean([value.value for value in found]) == pytest.approx(beyond, rel=0.05)
-    assert {value.status for value in found} == {"measured"}
+    overshoots = [value for value in values if value.id == "CO"]
+    assert np.mean([value.value for value in overshoots]) == pytest.approx(beyond, rel=0.05)
+    assert {value.status for value in overshoots} == {"measured"}
 
 
 def test_an_overshoot_that_noise_would_make_is_marked() -> None:
     values, curves = corner_values(PLAN, cornering(0.0, 0.03e-3, sigma=6e-6), HERE, Instrument(6e-6))
-    found = [value for value in values if value.id == "CO"]
-    assert all(0.25 * value.value > 6e-6 for value in found)  # a reading is good enough, the largest of many is not
-    doubtful = {v.status for v, c in zip(found, curves, strict=True) if c.noise > 0.25 * v.value}
+    overshoots = [value for value in values if value.id == "CO"]
+    assert all(
+        0.25 * value.value > 6e-6 for value in overshoots
+    )  # a reading is good enough, the largest of many is not
+    doubtful = {v.status for v, c in zip(overshoots, curves, strict=True) if c.noise > 0.25 * v.value}
     assert doubtful <= {"instrument-too-coarse"}
-    assert "instrument-too-coarse" in {value.status for value in found}
+    assert "instrument-too-coarse" in {value.status for value in overshoots}
 
 
 def test_noise_beside_a_path_without_overshoot_is_no_overshoot() -> None:
@@ -434,9 +436,9 @@ def test_samples_too_slow_for_time_and_overshoot_are_said() -> None:
         (to_rest(0.05 * np.exp(-20 * t), t), EXACT, set()),
         (oscillating(1000.0), Instrument(0.03e-3), set()),
     ):
-        found = {value.status for value in settling_values(PLAN, samples, HERE, instrument)[0]}
-        assert found - allowed <= {"instrument-too-coarse"}
-        assert found
+        statuses = {value.status for value in settling_values(PLAN, samples, HERE, instrument)[0]}
+        assert statuses - allowed <= {"instrument-too-coarse"}
+        assert statuses
 
 
 def test_the_posing_time_goes_from_the_begin_of_the_motion_to_rest() -> None:

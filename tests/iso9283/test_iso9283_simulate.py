@@ -28,9 +28,9 @@ def calibrated() -> Robot:
     return truearm.calibrate("irb120", data, model="elastic", payload="2.7kg,50mm,25mm,100mm").robot
 
 
-def accuracy(found: Iso9283Simulation, pose: str) -> tuple[float, float]:
+def accuracy(simulation: Iso9283Simulation, pose: str) -> tuple[float, float]:
     """Return how far the middle of what was attained is from the command, and by how much it scatters [m]."""
-    poses, tie = found.campaign.poses, found.tie.T_base_instrument
+    poses, tie = simulation.campaign.poses, simulation.tie.T_base_instrument
     assert poses is not None
     attained = poses.position[poses.pose.are(pose)] @ tie.rotation.T + np.array(tie.translation)
     middle = attained.mean(axis=0)
@@ -53,11 +53,11 @@ def test_corrected_commands_are_ten_times_as_accurate_and_as_repeatable(calibrat
 
 def test_a_calibration_of_another_truth_is_told(calibrated: Robot) -> None:
     plan = small_plan(["AP"], cycles={"AP": 1})
-    found = truearm.iso9283_simulate("irb120", plan, truth="random", seed=1, corrected=calibrated)
-    (notice,) = found.warnings
+    simulation = truearm.iso9283_simulate("irb120", plan, truth="random", seed=1, corrected=calibrated)
+    (notice,) = simulation.warnings
     assert (notice.code, notice.level) == ("another-truth", "warning")
-    assert "calibrated on another truth" in found.lines()[-1]
-    assert found.summary()["warnings"][0]["code"] == "another-truth"
+    assert "calibrated on another truth" in simulation.lines()[-1]
+    assert simulation.summary()["warnings"][0]["code"] == "another-truth"
 
 
 def test_a_path_is_corrected_as_well(calibrated: Robot) -> None:
@@ -66,8 +66,8 @@ def test_a_path_is_corrected_as_well(calibrated: Robot) -> None:
     along = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
     off = []
     for robot in (None, calibrated):
-        found = truearm.iso9283_simulate("irb120", plan, truth=TRUTH, seed=5, corrected=robot)
-        tie, paths = found.tie.T_base_instrument, found.campaign.paths
+        simulation = truearm.iso9283_simulate("irb120", plan, truth=TRUTH, seed=5, corrected=robot)
+        tie, paths = simulation.tie.T_base_instrument, simulation.campaign.paths
         assert paths is not None
         way = paths.position @ tie.rotation.T + np.array(tie.translation) - line[0]
         off.append(float(np.linalg.norm(way - np.outer(way @ along, along), axis=1).mean()))
@@ -76,7 +76,7 @@ def test_a_path_is_corrected_as_well(calibrated: Robot) -> None:
 
 def test_the_files_have_the_columns_and_units_that_are_read(tmp_path: Path) -> None:
     plan = small_plan(["AP", "E", "AV", "t", "compliance"], cycles={"AP": 1, "E": 1, "AV": 1, "t": 1, "compliance": 1})
-    found = truearm.iso9283_simulate("irb120", plan, rate=50.0, out=tmp_path / "run")
+    simulation = truearm.iso9283_simulate("irb120", plan, rate=50.0, out=tmp_path / "run")
     texts = {path.name: path.read_text().splitlines() for path in (tmp_path / "run").iterdir()}
     place, turn = "x [mm],y [mm],z [mm]", "qw,qx,qy,qz"
     shares = "velocity [%],load [%],time [s]"
@@ -86,14 +86,14 @@ def test_the_files_have_the_columns_and_units_that_are_read(tmp_path: Path) -> N
     assert texts["forces.csv"][0] == f"direction,force [N],cycle,{place},simulated"
     assert texts["alignment.yaml"][1] == "truearm: truearm-alignment/1"
     rows = {name: len(lines) - 1 for name, lines in texts.items() if name.endswith(".csv")}
-    assert rows == {f"{name}.csv": count for name, count in found.summary()["rows"].items()}
+    assert rows == {f"{name}.csv": count for name, count in simulation.summary()["rows"].items()}
     first = texts["paths.csv"][1].split(",")
-    paths = found.campaign.paths
+    paths = simulation.campaign.paths
     assert paths is not None
     assert first[:5] == ["AV", "line", "1", "100", "100"]
     np.testing.assert_allclose([float(v) for v in first[6:9]], 1e3 * paths.position[0], atol=1e-6)
     assert texts["poses.csv"][6].split(",")[:3] == ["E", "r1", "P5"]
-    assert found.written == ("poses.csv", "paths.csv", "settling.csv", "forces.csv", "alignment.yaml")
+    assert simulation.written == ("poses.csv", "paths.csv", "settling.csv", "forces.csv", "alignment.yaml")
 
 
 def test_the_tie_is_off_by_what_it_states() -> None:
@@ -138,16 +138,16 @@ def test_what_cannot_be_simulated_is_refused(calibrated: Robot) -> None:
         ("irb120", {"corrected": "katana450"}, "this is another robot than irb120"),
         ("irb120", {"corrected": ur5_calibrated}, "this is another robot than irb120"),
     ]
-    for robot, given, said in cases:
-        with pytest.raises(InputError, match=said):
-            truearm.iso9283_simulate(robot, **{"plan": plan, **given})
+    for robot, options, words in cases:
+        with pytest.raises(InputError, match=words):
+            truearm.iso9283_simulate(robot, **{"plan": plan, **options})
 
 
 def test_a_robot_of_which_no_compliance_is_known_gives_way_to_pushes_as_real_ones_do() -> None:
     plan = small_plan(["compliance", "AP"], cycles={"compliance": 1, "AP": 1})
     for truth in ("random", "nominal"):
-        found = truearm.iso9283_simulate("irb120", plan, truth=truth, noise=0.0, seed=4)
-        forces, tie = found.campaign.forces, found.tie.T_base_instrument
+        simulation = truearm.iso9283_simulate("irb120", plan, truth=truth, noise=0.0, seed=4)
+        forces, tie = simulation.campaign.forces, simulation.tie.T_base_instrument
         assert forces is not None
         for way in forces.direction.names:
             rows = forces.direction.are(way)

@@ -6,7 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.iso9283.known_motions import LENGTH, PLAN, V, cornering, damped, part, runs, said, said_of_paths, to_rest
+from tests.iso9283.known_motions import (
+    LENGTH,
+    PLAN,
+    V,
+    cornering,
+    damped,
+    notices_of,
+    notices_of_paths,
+    part,
+    runs,
+    to_rest,
+)
 from tests.moving_tip import CENTRE, EXACT, HERE, NORMAL, TRACKER, along, samples_of, stream_of, the, times
 
 from truearm.engine.base.errors import InputError, Notice
@@ -45,8 +56,8 @@ def refusal_of_path(samples: Samples) -> str:
     return str(caught.value)
 
 
-def said_of_settling(samples: Samples) -> dict[str, Notice]:
-    return said(settling=tuple(settling_values(PLAN, samples, HERE, Instrument(5e-6))[1]))
+def notices_of_settling(samples: Samples) -> dict[str, Notice]:
+    return notices_of(settling=tuple(settling_values(PLAN, samples, HERE, Instrument(5e-6))[1]))
 
 
 # -- where no tip can have been ------------------------------------------------------------------------
@@ -101,8 +112,8 @@ def test_an_outlying_sample_on_the_way_to_rest_is_refused() -> None:
 @pytest.mark.parametrize(("size", "rows"), [(2e-3, [310]), (0.4e-3, [310]), (1e-3, [310, 311])])
 def test_a_sample_that_lies_apart_as_in_no_other_cycle_is_said(size: float, rows: list[int]) -> None:
     samples = runs()
-    assert not said_of_paths(samples)
-    notice = said_of_paths(moved(samples, rows, size))["unusual-samples"]
+    assert not notices_of_paths(samples)
+    notice = notices_of_paths(moved(samples, rows, size))["unusual-samples"]
     assert notice.level == "warning"
     cycle = int(samples.cycle[rows[0]])
     assert any(
@@ -113,22 +124,22 @@ def test_a_sample_that_lies_apart_as_in_no_other_cycle_is_said(size: float, rows
 
 def test_a_small_spike_at_rest_is_said() -> None:
     samples = resting()
-    assert "unusual-samples" not in said_of_settling(samples)
-    notice = said_of_settling(moved(samples, [2700], 0.1e-3))["unusual-samples"]
+    assert "unusual-samples" not in notices_of_settling(samples)
+    notice = notices_of_settling(moved(samples, [2700], 0.1e-3))["unusual-samples"]
     assert "line 2702 (cycle 3 of t at P1" in notice.message
 
 
 def test_many_unusual_samples_are_counted() -> None:
-    message = said_of_paths(moved(runs(), [30, 60, 250, 280, 310, 340], 2e-3))["unusual-samples"].message
+    message = notices_of_paths(moved(runs(), [30, 60, 250, 280, 310, 340], 2e-3))["unusual-samples"].message
     assert message.count("cycle 1 of") + message.count("cycle 2 of") == 5
     assert "and 1 more" in message
 
 
 def test_what_all_cycles_have_is_not_unusual_nor_anything_of_two_cycles() -> None:
-    assert not said_of_paths(moved(runs(cycles=2), [60], 1e-3))
+    assert not notices_of_paths(moved(runs(cycles=2), [60], 1e-3))
     samples = runs()
     everywhere = [60 + k * int((samples.cycle == 1).sum()) for k in range(5)]
-    assert not said_of_paths(moved(samples, everywhere, 2e-3))
+    assert not notices_of_paths(moved(samples, everywhere, 2e-3))
 
 
 def test_clean_streams_have_no_unusual_sample() -> None:
@@ -145,8 +156,8 @@ def test_clean_streams_have_no_unusual_sample() -> None:
         (run,) = runs_of(PLAN, samples_of("AT", name, [(0, t, p)]), HERE, "AT")
         cycles = run.cycles
         assert len(cycles) == 5, seed
-        told = unusual_samples([c.time for c in cycles], [c.position for c in cycles], [c.along for c in cycles])
-        assert not told, seed
+        unusual = unusual_samples([c.time for c in cycles], [c.position for c in cycles], [c.along for c in cycles])
+        assert not unusual, seed
 
 
 # -- cycles as a whole ---------------------------------------------------------------------------------
@@ -154,7 +165,7 @@ def test_clean_streams_have_no_unusual_sample() -> None:
 
 def test_a_cycle_that_lies_apart_as_a_whole_is_said_with_what_is_without_it() -> None:
     samples = runs()
-    notice = said_of_paths(moved(samples, slice(0, int((samples.cycle == 1).sum())), 1e-3))["outlying-cycle"]
+    notice = notices_of_paths(moved(samples, slice(0, int((samples.cycle == 1).sum())), 1e-3))["outlying-cycle"]
     assert notice.level == "warning"
     assert "cycle 1 of AT on line by 0.99" in notice.message
     assert "RT is 1.1" in notice.message
@@ -167,17 +178,17 @@ def test_cycles_that_scatter_are_not_outlying() -> None:
     for scale in (1e-5, 1e-3):
         for _ in range(20):
             off = scale * rng.standard_normal((11, 3))[samples.cycle]
-            assert "outlying-cycle" not in said_of_paths(replace(samples, position=samples.position + off)), scale
+            assert "outlying-cycle" not in notices_of_paths(replace(samples, position=samples.position + off)), scale
 
 
 def test_samples_that_are_missing_on_a_part_of_the_way_are_said() -> None:
     samples = runs()
     rows = np.arange(len(samples.time))
-    notice = said_of_paths(part(samples, (rows < 100) | (rows >= 130)))["gap-in-path"]
+    notice = notices_of_paths(part(samples, (rows < 100) | (rows >= 130)))["gap-in-path"]
     assert notice.level == "warning"
     assert "77.5 mm between lines 101 and 102 (cycle 1 of AT on line)" in notice.message
     lost = np.random.default_rng(0).random(len(rows)) < 0.2
-    assert not said_of_paths(part(samples, ~lost))
+    assert not notices_of_paths(part(samples, ~lost))
 
 
 def test_two_runs_or_ways_to_rest_under_one_number_are_refused() -> None:
@@ -189,9 +200,9 @@ def test_two_runs_or_ways_to_rest_under_one_number_are_refused() -> None:
     text = refusal_of_path(samples_of("AT", "line", [(1, np.concatenate([t, t + 3.0, t + 6.0]), position)]))
     assert "cycle 1 of line runs the path 2 times" in text
     assert "Number the cycles, or leave the cells" in text
-    rest = part(resting(), resting().cycle == 1)
-    time = np.concatenate([rest.time, rest.time + 3.0])
-    both = np.concatenate([rest.position, CENTRE + 0.5 * (rest.position - CENTRE)])
+    at_rest = part(resting(), resting().cycle == 1)
+    time = np.concatenate([at_rest.time, at_rest.time + 3.0])
+    both = np.concatenate([at_rest.position, CENTRE + 0.5 * (at_rest.position - CENTRE)])
     with pytest.raises(InputError, match=r"about line \d+: the tip goes away again after it came to rest; got '2[45]"):
         settling_values(PLAN, samples_of("t", "P1", [(1, time, both)]), HERE, EXACT)
 
@@ -222,8 +233,8 @@ def ringing(rate: float, sigma: float, *, amplitude: float = 5e-3) -> Samples:
     rng, rows = np.random.default_rng(2), []
     for k in (1, 2, 3):
         t = times(1.5, rate) + k / 3 / rate
-        one = to_rest(damped(t - 0.1, amplitude, 8.0, DAMPING), t, cycles=1)
-        rows.append((k, t, one.position + rng.normal(0.0, sigma, one.position.shape)))
+        cycle = to_rest(damped(t - 0.1, amplitude, 8.0, DAMPING), t, cycles=1)
+        rows.append((k, t, cycle.position + rng.normal(0.0, sigma, cycle.position.shape)))
     return samples_of("t", "P1", rows)
 
 
@@ -238,7 +249,7 @@ def test_noise_makes_an_overshoot_little_larger() -> None:
 def test_an_oscillation_with_fewer_than_eight_samples_a_period_is_marked(rate: float, status: str) -> None:
     values, curves = settling_values(PLAN, ringing(rate, 0.0), HERE, EXACT)
     assert {value.status for value in values} == {status}
-    assert ("sampled-too-slowly" in said(settling=tuple(curves))) == (status != "measured")
+    assert ("sampled-too-slowly" in notices_of(settling=tuple(curves))) == (status != "measured")
 
 
 def test_an_excursion_that_noise_puts_in_the_band_or_outside_is_marked() -> None:
@@ -252,15 +263,15 @@ def test_an_excursion_that_noise_puts_in_the_band_or_outside_is_marked() -> None
 
 def test_a_path_at_a_third_of_the_velocity_is_said_and_a_small_circle_or_a_pause_is_not() -> None:
     samples = runs()
-    notice = said_of_paths(replace(samples, time=3 * samples.time))["slow-path"]
+    notice = notices_of_paths(replace(samples, time=3 * samples.time))["slow-path"]
     assert notice.level == "warning"
     assert "AT on line at 83." in notice.message
     assert "of 250 mm/s" in notice.message
     circle = runs(shape="small-circle")
-    assert not said_of_paths(replace(circle, time=3 * circle.time))
+    assert not notices_of_paths(replace(circle, time=3 * circle.time))
     t = times(LENGTH / V + 4.0, 100.0)
     s = np.where(t < 0.5, V * t, np.where(t < 4.5, V * 0.5, V * (t - 4.0)))
-    assert not said_of_paths(samples_of("AT", "line", [(1, t, along(PLAN, "line", s))]))
+    assert not notices_of_paths(samples_of("AT", "line", [(1, t, along(PLAN, "line", s))]))
 
 
 # -- times of another unit -----------------------------------------------------------------------------
@@ -272,10 +283,10 @@ def test_times_of_another_unit_are_refused(factor: float, word: str) -> None:
     text = refusal_of_path(replace(samples, time=samples.time * factor))
     assert f"the path line was run much {word} than commanded" in text
     assert "allowed: 5 to 500 mm/s; commanded are 250. Name the unit of the times" in text
-    rest = resting()
+    at_rest = resting()
     word = {"slower": "more slowly", "faster": "faster"}[word]
     with pytest.raises(InputError, match=rf"the tip would move {word} than any robot's.*Write the times in seconds"):
-        settling_values(PLAN, replace(rest, time=rest.time * factor * (10 if factor > 1 else 0.1)), HERE, EXACT)
+        settling_values(PLAN, replace(at_rest, time=at_rest.time * factor * (10 if factor > 1 else 0.1)), HERE, EXACT)
 
 
 def test_orientations_in_another_order_are_refused() -> None:
@@ -289,16 +300,16 @@ def test_samples_that_two_cycles_share_are_named() -> None:
     samples = runs()
     assert copied_blocks(samples) == () == copied_blocks(replace(samples, position=np.round(samples.position, 5)))
     position = samples.position.copy()
-    one, other = (np.flatnonzero(samples.cycle == cycle)[20:60] for cycle in (2, 4))
-    position[other] = position[one]
+    first, second = (np.flatnonzero(samples.cycle == cycle)[20:60] for cycle in (2, 4))
+    position[second] = position[first]
     (block,) = copied_blocks(replace(samples, position=position))
     assert (block.test, block.place, block.cycles, block.count) == ("AT", "line", (2, 4), 40)
-    assert block.lines == (int(samples.line[one[0]]), int(samples.line[other[0]]))
+    assert block.lines == (int(samples.line[first[0]]), int(samples.line[second[0]]))
     (notice,) = copied_notices([block])
     assert (notice.code, notice.level) == ("copied-samples", "warning")
     assert f"cycles 2 and 4 of AT line, 40 samples from lines {block.lines[0]} and {block.lines[1]}." in notice.message
     assert copied_notices([]) == []
-    position[other[9:]] = samples.position[other[9:]]
+    position[second[9:]] = samples.position[second[9:]]
     assert copied_blocks(replace(samples, position=position)) == ()
 
 
@@ -308,9 +319,9 @@ def test_corners_between_samples_are_marked(rate: float, status: str) -> None:
     assert {value.status for value in values} == {status}
     if status == "measured":
         assert the(values, "CR", where="rectangle E3").value == pytest.approx((np.sqrt(2) - 1) * 0.01, rel=0.03)
-        assert "sampled-too-slowly" not in said(corners=tuple(corners))
+        assert "sampled-too-slowly" not in notices_of(corners=tuple(corners))
     else:
-        notice = said(corners=tuple(corners))["sampled-too-slowly"]
+        notice = notices_of(corners=tuple(corners))["sampled-too-slowly"]
         assert (notice.level, "CR, CO" in notice.message) == ("warning", True)
 
 
@@ -318,19 +329,19 @@ def test_a_path_with_fewer_samples_than_half_of_the_stations_is_marked() -> None
     samples = runs(rate=10.0)
     values, records = path_values(PLAN, samples, HERE, EXACT)
     assert {value.status for value in values} == {"instrument-too-coarse"}
-    assert "AT, RT" in said(deviations=tuple(records))["sampled-too-slowly"].message
+    assert "AT, RT" in notices_of(deviations=tuple(records))["sampled-too-slowly"].message
 
 
 def test_a_corner_of_a_path_that_lies_beside_is_said_with_its_own() -> None:
     samples = cornering(0.005, apart=1 / 3)
     values, corners = corner_values(PLAN, samples, HERE, EXACT)
-    assert not said(corners=tuple(corners))
+    assert not notices_of(corners=tuple(corners))
     off = np.array([1e-3, 0.0, 0.0]) + 2e-3 * NORMAL
     _, corners = corner_values(PLAN, replace(samples, position=samples.position + off), HERE, EXACT)
     for corner in corners:
         assert corner.aside == pytest.approx(np.tile(off, (3, 1)), abs=1e-6)
         assert corner.own == pytest.approx(the(values, "CR", where=corner.where).value, rel=0.02)
-    notice = said(corners=tuple(corners))["corner-offset"]
+    notice = notices_of(corners=tuple(corners))["corner-offset"]
     assert notice.level == "note"
     assert "lies 2.236 mm beside" in notice.message
 
@@ -358,17 +369,17 @@ def test_the_interval_of_the_fluctuation_holds_every_swing_up_to_its_bandwidth(
     else:
         assert (value.bandwidth > 5.0) == (turns > 5.0)
     assert value_summary(value)["bandwidth_hz"] == value.bandwidth
-    notice = said(velocities=tuple(curves))["velocity-bandwidth"]
+    notice = notices_of(velocities=tuple(curves))["velocity-bandwidth"]
     assert notice.level == "note"
     assert f"up to {value.bandwidth:.2g} Hz" in notice.message
 
 
-@pytest.mark.parametrize(("cycles", "there"), [(4, False), (5, True)])
-def test_paths_have_intervals_from_five_cycles_on(cycles: int, there: bool) -> None:
+@pytest.mark.parametrize(("cycles", "has_interval"), [(4, False), (5, True)])
+def test_paths_have_intervals_from_five_cycles_on(cycles: int, has_interval: bool) -> None:
     samples = runs(cycles=cycles)
     values = path_values(PLAN, samples, HERE, TRACKER)[0]
     moving = replace(samples, criterion=replace(samples.criterion, names=("AV",)))
     values += velocity_values(PLAN, moving, HERE, TRACKER)[0]
     for id_ in ("AT", "RT", "AV", "RV", "FV"):
-        assert (the(values, id_).interval is not None) == there
+        assert (the(values, id_).interval is not None) == has_interval
         assert np.isfinite(the(values, id_).value)

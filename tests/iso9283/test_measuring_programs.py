@@ -32,8 +32,8 @@ TIP = 0.1
 
 @pytest.fixture(scope="module")
 def programs() -> dict[str, MotionProgram]:
-    made = measuring_programs(PLAN, 1.5, "abc")
-    return {one.name: one for one in (*made.slow, *made.faster)}
+    written = measuring_programs(PLAN, 1.5, "abc")
+    return {program.name: program for program in (*written.slow, *written.faster)}
 
 
 def text_of(name: str, program: MotionProgram) -> str:
@@ -67,8 +67,8 @@ def meant(name: str, program: MotionProgram) -> list[tuple[str, int | None, int]
     return moves
 
 
-def check_target(found: Program, index: int, program: MotionProgram, row: int) -> None:
-    target = found.targets[index]
+def check_target(read: Program, index: int, program: MotionProgram, row: int) -> None:
+    target = read.targets[index]
     form, values = target.form, np.array(target.values)
     if form.kind == "joints":
         assert values * form.angle == pytest.approx(program.joints[row], abs=1e-6)
@@ -84,16 +84,16 @@ def check_target(found: Program, index: int, program: MotionProgram, row: int) -
 def test_the_own_reader_finds_every_move_again_in_order(name: str, programs: dict[str, MotionProgram]) -> None:
     assert {"AP_10", "AT_10", "AT_100", "REORI_100", "WS_10", "COMPL_10", "VAP_100"} <= set(programs)
     for program in programs.values():
-        found = read_again(name, program)
-        assert found.skipped == ()
-        assert not found.unknown
+        read = read_again(name, program)
+        assert read.skipped == ()
+        assert not read.unknown
         wanted = meant(name, program)
-        assert [move.kind for move in found.moves] == [kind for kind, _, _ in wanted]
-        for move, (_, via, target) in zip(found.moves, wanted, strict=True):
-            check_target(found, move.target, program, target)
+        assert [move.kind for move in read.moves] == [kind for kind, _, _ in wanted]
+        for move, (_, via, target) in zip(read.moves, wanted, strict=True):
+            check_target(read, move.target, program, target)
             assert (move.via is None) == (via is None)
             if move.via is not None and via is not None:
-                check_target(found, move.via, program, via)
+                check_target(read, move.via, program, via)
 
 
 @pytest.mark.parametrize("name", BY_NAME)
@@ -111,10 +111,10 @@ def test_the_controller_takes_the_joint_positions_that_were_checked(
     cell = Cell(read_tools(calibrated, file), {})
     for key in ("VAP_10", "REORI_10", "CR_10"):
         program = programs[key]
-        found = read_again(name, program)
-        went = robot.controller.from_model(commanded(calibrated, found, cell))
+        read = read_again(name, program)
+        went = robot.controller.from_model(commanded(calibrated, read, cell))
         rows = [row for _, _, row in meant(name, program)]
-        ends = [move.target for move in found.moves]
+        ends = [move.target for move in read.moves]
         apart = went[ends] - program.joints[rows]  # joint 6 stands at 180 deg, where a turn is as good as none
         apart[:, 5] = (apart[:, 5] + np.pi) % (2 * np.pi) - np.pi
         assert apart == pytest.approx(0.0, abs=5e-5)
@@ -195,9 +195,9 @@ def test_joint_motions_keep_to_the_velocity_and_in_the_first_run_to_250_mm_a_sec
         plan.robot, joints=tuple(replace(joint, max_speed=speed if known else None) for joint, speed in joints)
     )
     assert (known_speeds(robot) is not None) == known
-    made = measuring_programs(replace(plan, robot=robot), 1.0, "abc", "VAL3")
+    written = measuring_programs(replace(plan, robot=robot), 1.0, "abc", "VAL3")
     fastest = 0.0
-    for program in made.slow:
+    for program in written.slow:
         moves = [step for step in program.steps if isinstance(step, JointMove)]
         for before, move in pairwise(moves):
             ends = robot.controller.to_model(program.joints[[before.target, move.target]])
@@ -205,7 +205,7 @@ def test_joint_motions_keep_to_the_velocity_and_in_the_first_run_to_250_mm_a_sec
             fastest = max(fastest, fastest_point(robot, ends) / max(seconds, 1e-9))
     assert fastest <= 0.25 * (1.0 + 1e-6)
     assert fastest > (0.24 if known else 0.1)
-    shares = {step.share for one in made.faster for step in one.steps if isinstance(step, JointMove)}
+    shares = {step.share for faster in written.faster for step in faster.steps if isinstance(step, JointMove)}
     assert max(shares) == 1.0
     script = measuring_programs(replace(plan, robot=robot), 1.0, "abc", "URScript")
     top = np.array(speeds if known else [FASTEST] * 6)
@@ -241,15 +241,15 @@ def test_cycles_go_where_the_test_asks(programs: dict[str, MotionProgram]) -> No
 def test_the_first_run_is_at_a_tenth_and_at_most_250_mm_a_second() -> None:
     fast = measuring_programs(replace(small_plan(["AV"], velocities=(1.0, 0.1)), rated_velocity=5.0), 1.0, "abc")
     assert fast.share == pytest.approx(0.05)
-    assert [one.name for one in fast.slow] == ["AV_5"]
-    assert [one.name for one in fast.faster] == ["AV_100", "AV_10"]
-    assert max(step.speed for one in fast.slow for step in one.steps if isinstance(step, StraightMove)) <= 0.25
+    assert [program.name for program in fast.slow] == ["AV_5"]
+    assert [program.name for program in fast.faster] == ["AV_100", "AV_10"]
+    assert max(step.speed for program in fast.slow for step in program.steps if isinstance(step, StraightMove)) <= 0.25
     weaving = measuring_programs(small_plan(["WS"], velocities=(0.1,), rated_velocity=2.5), 1.0, "abc")
-    assert [one.name for one in weaving.faster] == ["WS_10"]
+    assert [program.name for program in weaving.faster] == ["WS_10"]
     assert weaving.slow[0].name == "WS_7p071"  # the tip goes aside as fast as ahead
     assert max(step.speed for step in weaving.slow[0].steps if isinstance(step, StraightMove)) <= 0.25 + 1e-12
     loaded = measuring_programs(small_plan(["AP"], loads=(1.0, 0.1)), 1.0, "abc")
-    assert [one.name for one in loaded.slow] == ["AP_10_L100", "AP_10_L10"]
+    assert [program.name for program in loaded.slow] == ["AP_10_L100", "AP_10_L10"]
     assert loaded.slow[1].notes[2] == "10 % velocity, load 0.3 kg"
 
 
@@ -260,8 +260,8 @@ def with_tip(plan: PerformancePlan) -> PerformancePlan:
     def moved(point: Array, rotation: Array) -> Array:
         return np.asarray(point + TIP * rotation[:, 2])
 
-    poses = {name: replace(one, position=moved(one.position, one.rotation)) for name, one in plan.poses.items()}
-    paths = {name: replace(one, points=moved(one.points, one.rotation)) for name, one in plan.paths.items()}
+    poses = {name: replace(pose, position=moved(pose.position, pose.rotation)) for name, pose in plan.poses.items()}
+    paths = {name: replace(path, points=moved(path.points, path.rotation)) for name, path in plan.paths.items()}
     return replace(plan, robot=robot, target="tip", poses=poses, paths=paths)
 
 
@@ -310,7 +310,7 @@ def test_what_cannot_be_gone_is_refused_with_the_move() -> None:
         points[2] = corner
         return replace(plan, paths={**plan.paths, "rectangle": replace(rectangle, points=points)})
 
-    kept = replace(plan.paths["line"], other=None)
+    unturned = replace(plan.paths["line"], other=None)
     for wrong, text in (
         (
             replace(plan, poses={**plan.poses, "P3": far}),
@@ -326,7 +326,7 @@ def test_what_cannot_be_gone_is_refused_with_the_move() -> None:
             r"dAP: a pose is not in the plan; got 'P2'",
         ),
         (
-            replace(plan, paths={"line": kept}, tests=small_plan(["AT-reorientation"]).tests),
+            replace(plan, paths={"line": unturned}, tests=small_plan(["AT-reorientation"]).tests),
             "this path has one orientation, and another is needed",
         ),
     ):

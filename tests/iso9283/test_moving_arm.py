@@ -166,7 +166,7 @@ def test_a_truth_that_gives_way_keeps_its_own_compliance(arm: MovingArm) -> None
     force = np.array([[0.0, 0.0, 20.0]])
     still = np.zeros((1, 6))
     other = replace(arm, compliance=SOFT)
-    first, second = (one.at_rest(JOINTS[:1], still, EVER[:1], force) for one in (arm, other))
+    first, second = (moving.at_rest(JOINTS[:1], still, EVER[:1], force) for moving in (arm, other))
     np.testing.assert_array_equal(first, second)
 
 
@@ -186,7 +186,7 @@ STEP = 1e-3
 CORNER = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.2, 0.0]])
 
 
-def kept(points: np.ndarray) -> np.ndarray:
+def unturned(points: np.ndarray) -> np.ndarray:
     return np.broadcast_to(np.eye(3), (len(points), 3, 3))
 
 
@@ -199,7 +199,7 @@ def rates(commands: Commands) -> tuple[float, float]:
 
 @pytest.mark.parametrize("zone", [0.001, 0.01])
 def test_a_corner_is_cut_within_its_zone_at_the_known_distance(zone: float) -> None:
-    commands = along_lines(CORNER, kept(CORNER), Pace(0.5, 10.0, zone), 1e-4)
+    commands = along_lines(CORNER, unturned(CORNER), Pace(0.5, 10.0, zone), 1e-4)
     away = np.linalg.norm(commands.position - CORNER[1], axis=1)
     assert away.min() == pytest.approx(zone * math.sqrt(2) / 4, rel=1e-3)
     off = np.minimum(np.abs(commands.position[:, 1]), np.abs(commands.position[:, 0] - 0.3))
@@ -209,7 +209,7 @@ def test_a_corner_is_cut_within_its_zone_at_the_known_distance(zone: float) -> N
 
 
 def test_velocity_and_acceleration_are_kept_and_the_ends_met() -> None:
-    commands = along_lines(CORNER, kept(CORNER), Pace(0.5, 10.0, 0.005), STEP)
+    commands = along_lines(CORNER, unturned(CORNER), Pace(0.5, 10.0, 0.005), STEP)
     speed, change = rates(commands)
     assert speed == pytest.approx(0.5, abs=1e-9)
     assert change <= 10.0 + 1e-6
@@ -217,7 +217,7 @@ def test_velocity_and_acceleration_are_kept_and_the_ends_met() -> None:
 
 
 def test_without_a_zone_it_stops_in_the_corner() -> None:
-    commands = along_lines(CORNER, kept(CORNER), Pace(0.5, 10.0), 1e-4)
+    commands = along_lines(CORNER, unturned(CORNER), Pace(0.5, 10.0), 1e-4)
     away = np.linalg.norm(commands.position - CORNER[1], axis=1)
     assert away.min() < 1e-6
     duration = sum(length / 0.5 + 0.5 / 10.0 for length in (0.3, 0.2))
@@ -226,7 +226,7 @@ def test_without_a_zone_it_stops_in_the_corner() -> None:
 
 def test_many_short_lines_are_slowed_down_for_ahead() -> None:
     points = np.column_stack([0.002 * np.arange(40), 0.002 * (np.arange(40) % 2), np.zeros(40)])
-    speed, change = rates(along_lines(points, kept(points), Pace(1.0, 5.0, 0.0005), STEP))
+    speed, change = rates(along_lines(points, unturned(points), Pace(1.0, 5.0, 0.0005), STEP))
     assert speed < 0.2
     assert change <= 5.0 + 1e-6
 
@@ -275,7 +275,7 @@ def test_a_move_of_joints_begins_and_ends_together_within_its_limits() -> None:
 def test_paths_and_paces_that_cannot_be_are_refused() -> None:
     twice = CORNER[[0, 0, 1]]
     with pytest.raises(InputError, match="neighbouring points of a path must be apart"):
-        along_lines(twice, kept(twice), Pace(0.5), STEP)
+        along_lines(twice, unturned(twice), Pace(0.5), STEP)
     with pytest.raises(InputError, match="a circle must have a radius"):
         along_circle(np.zeros(3), np.zeros(3), np.array([0.0, 0.0, 1.0]), np.eye(3), Pace(0.5), STEP)
     with pytest.raises(InputError, match="it must be a positive number"):

@@ -132,7 +132,7 @@ def test_rows_are_the_same_whatever_the_size_of_the_blocks(
 
 
 @pytest.mark.parametrize(
-    ("read", "header", "row", "said"),
+    ("read", "header", "row", "words"),
     [
         (poses, POSES, "AP,P1,1.5,100,100,1,2,3", "line 2, column cycle: a cycle is a whole number"),
         (poses, POSES, "AP,P1,0,100,100,1,2,3", "a cycle is a whole number"),
@@ -188,9 +188,9 @@ def test_rows_are_the_same_whatever_the_size_of_the_blocks(
     ],
 )
 def test_what_cannot_be_used_is_refused_with_its_place(
-    written: Callable[..., Path], read: Callable[[Path], object], header: str, row: str, said: str
+    written: Callable[..., Path], read: Callable[[Path], object], header: str, row: str, words: str
 ) -> None:
-    assert said in refused(written(row, header=header), read)
+    assert words in refused(written(row, header=header), read)
 
 
 @pytest.mark.parametrize(("velocity", "load"), [("0", "9"), ("120", "9"), ("9", "110"), ("9", "-1"), ("x", "1")])

@@ -49,14 +49,14 @@ def poses_of(campaign: SimulatedCampaign) -> AttainedPoses:
     return campaign.poses
 
 
-def stream(found: tuple[SimulatedCampaign, Array], test: str, place: str) -> tuple[Array, Array, Array | None]:
+def stream(simulated: tuple[SimulatedCampaign, Array], test: str, place: str) -> tuple[Array, Array, Array | None]:
     """Return time, position and orientation of the first cycle in the base frame."""
-    campaign, base = found
+    campaign, base = simulated
     samples = campaign.settling if test in ("t", "posing-time") else campaign.paths
     assert samples is not None
-    here = samples.criterion.are(test) & samples.place.are(place) & (samples.cycle == 1)
-    turned = None if samples.rotation is None else base[:3, :3].T @ samples.rotation[here]
-    return samples.time[here], in_base(samples.position[here], base), turned
+    rows = samples.criterion.are(test) & samples.place.are(place) & (samples.cycle == 1)
+    turned = None if samples.rotation is None else base[:3, :3].T @ samples.rotation[rows]
+    return samples.time[rows], in_base(samples.position[rows], base), turned
 
 
 @pytest.fixture(scope="module")
@@ -101,8 +101,8 @@ def test_pushes_are_in_both_senses_of_each_axis_in_tenths_of_the_load(whole: Sim
     forces = whole.forces
     assert forces is not None
     assert forces.direction.names == ("+x", "-x", "+y", "-y", "+z", "-z")
-    one = forces.direction.are("+z") & (forces.cycle == 2)
-    np.testing.assert_allclose(forces.force[one], np.arange(11) * 0.1 * 3.0 * 9.80665)
+    chosen = forces.direction.are("+z") & (forces.cycle == 2)
+    np.testing.assert_allclose(forces.force[chosen], np.arange(11) * 0.1 * 3.0 * 9.80665)
 
 
 def test_the_same_seed_gives_the_same_readings_and_another_one_others() -> None:
@@ -130,8 +130,8 @@ def test_joints_that_come_to_rest_elsewhere_scatter_the_tip_by_the_jacobian() ->
     campaign, base = run(plan, drives=replace(IDEAL, scatter=1e-5))
     J = plan.robot.jacobian(plan.poses["P1"].joints[None])[0, :3]
     expected = 1e-10 * J @ J.T
-    found = np.cov(in_base(poses_of(campaign).position, base).T)
-    np.testing.assert_allclose(found, expected, atol=0.2 * expected.max())
+    covariance = np.cov(in_base(poses_of(campaign).position, base).T)
+    np.testing.assert_allclose(covariance, expected, atol=0.2 * expected.max())
 
 
 def test_the_middle_of_a_line_is_run_at_the_commanded_velocity(ideal: tuple[SimulatedCampaign, Array]) -> None:
@@ -187,11 +187,11 @@ def test_a_weave_goes_from_side_to_side_as_planned() -> None:
 
 def test_a_weak_servo_overshoots_and_the_tip_comes_to_rest_at_its_pose() -> None:
     plan = small_plan(["t", "posing-time"], cycles={"t": 1, "posing-time": 1})
-    found = run(plan, drives=replace(IDEAL, servo=Servo(60.0, 0.3, feedforward=1.0)))
-    away = np.linalg.norm(stream(found, "t", "P1")[1] - plan.poses["P1"].position, axis=1)
+    simulated = run(plan, drives=replace(IDEAL, servo=Servo(60.0, 0.3, feedforward=1.0)))
+    away = np.linalg.norm(stream(simulated, "t", "P1")[1] - plan.poses["P1"].position, axis=1)
     assert away[-1] < 1e-6
     assert away[int(np.argmax(away < plan.limit_band)) :].max() > plan.limit_band
-    _, begun, _ = stream(found, "posing-time", "D50")
+    _, begun, _ = stream(simulated, "posing-time", "D50")
     np.testing.assert_allclose(begun[0], plan.poses["P1"].position, atol=1e-8)
     np.testing.assert_allclose(begun[-1], plan.poses["D50"].position, atol=1e-6)
 
@@ -211,7 +211,7 @@ def test_plans_that_cannot_be_run_are_refused(monkeypatch: pytest.MonkeyPatch) -
     plan, lines = small_plan(["AP"], cycles={"AP": 1}), small_plan(["AT-reorientation"])
     line = lines.paths["line"]
     alone = replace(plan, poses={"P1": plan.poses["P1"]}, tests=(replace(plan.tests[0], places=("P1",)),))
-    for wrong, said in (
+    for wrong, words in (
         (replace(plan, tests=(replace(plan.tests[0], places=("P9", "P1")),)), "the plan has no such pose; got 'P9'"),
         (alone, "one pose alone"),
         (replace(lines, paths={}), "the plan has no such path; got 'line'"),
@@ -221,7 +221,7 @@ def test_plans_that_cannot_be_run_are_refused(monkeypatch: pytest.MonkeyPatch) -
             "the robot cannot come to a commanded pose",
         ),
     ):
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=words):
             run(wrong)
     monkeypatch.setenv("TRUEARM_LIMITS", "samples_read=100")
     with pytest.raises(InputError, match="too many samples"):

@@ -24,7 +24,7 @@ def test_the_arm_hides_what_lies_behind_a_link() -> None:
     joints = ROBOT.random_configurations(25, rng)
     arm, eye = ArmCapsules(ROBOT), np.zeros(3)
     points = {f"n{k}": 1.3 * in_world(np.array([0.0, 0.0, 0.35]) + rng.uniform(-0.2, 0.2, 3)) for k in range(8)}
-    found = hidden(ROBOT, joints, eye, points)
+    result = hidden(ROBOT, joints, eye, points)
     at = arm.points(joints)
     counts = [0, 0]
     for name, point in points.items():
@@ -37,10 +37,10 @@ def test_the_arm_hides_what_lies_behind_a_link() -> None:
                 far = np.linalg.norm(inside[:, None] - along, axis=2).min() - link.radius - BEAM
                 least = min(least, far)
             if abs(least) > 0.01:  # of what is nearly so, points along lines do not tell
-                assert (name in found[k]) == (least < 0)
+                assert (name in result[k]) == (least < 0)
                 counts[int(least < 0)] += 1
     assert min(counts) > 10
-    assert {words for one in found for words in one.values()} == {"the arm"}
+    assert {words for reasons in result for words in reasons.values()} == {"the arm"}
 
 
 def test_a_box_hides_what_lies_behind_it_and_is_named() -> None:

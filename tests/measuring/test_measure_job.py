@@ -75,20 +75,26 @@ def plan(tmp_path: Path) -> Path:
 
 
 def arm(plan: Path, out: Path, **more: Any) -> Any:
-    given: dict[str, Any] = {"device": "measurement-arm", "nests": ["n"], "every": 2} | more
-    return truearm.measure(plan, "irb120", out=out, **given)
+    options: dict[str, Any] = {"device": "measurement-arm", "nests": ["n"], "every": 2} | more
+    return truearm.measure(plan, "irb120", out=out, **options)
 
 
 def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(planned: Path, tmp_path: Path) -> None:
-    told: list[str] = []
-    given: dict[str, Any] = {"device": "tracker", "seed": 3, "disturbed": 0.2, "nests": ["n1", "n2", "n3"], "every": 6}
-    found = truearm.measure(planned, "irb120", out=tmp_path, tell=told.append, **given)
-    assert found.finished
-    assert len(told) == len(found.session.entries)
-    reasons = found.session.aside_by_reason
+    messages: list[str] = []
+    options: dict[str, Any] = {
+        "device": "tracker",
+        "seed": 3,
+        "disturbed": 0.2,
+        "nests": ["n1", "n2", "n3"],
+        "every": 6,
+    }
+    result = truearm.measure(planned, "irb120", out=tmp_path, tell=messages.append, **options)
+    assert result.finished
+    assert len(messages) == len(result.session.entries)
+    reasons = result.session.aside_by_reason
     assert {*reasons} == {"beam-break", "not-settled", "scatter"}
     assert sum(reasons.values()) > 3
-    assert [(notice.code, notice.level) for notice in found.warnings] == [("not-seen", "note"), ("not-said", "note")]
+    assert [(notice.code, notice.level) for notice in result.warnings] == [("not-seen", "note"), ("not-said", "note")]
     assert {p.name for p in tmp_path.iterdir()} == {BEGUN, DATA, LOG, PAGE, "truearm.manifest.json"}
     data = read_csv(tmp_path / DATA)
     assert data.sigma is not None
@@ -104,11 +110,11 @@ def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(
 
 
 def test_what_was_stopped_goes_on_to_the_same_files(plan: Path, tmp_path: Path) -> None:
-    whole, given = tmp_path / "whole", {"seed": 1, "disturbed": 0.3}
-    arm(plan, whole, **given)
+    whole, options = tmp_path / "whole", {"seed": 1, "disturbed": 0.3}
+    arm(plan, whole, **options)
     for stopped in (1, 4, 7):
         part = tmp_path / f"part-{stopped}"
-        more: dict[str, Any] = {"device": "measurement-arm", "nests": ["n"], "every": 2, **given}
+        more: dict[str, Any] = {"device": "measurement-arm", "nests": ["n"], "every": 2, **options}
         with open_campaign(plan, "irb120", part, **more) as campaign:
             assert isinstance(campaign.source, VirtualInstrument)
             assert not any(campaign.source.hides)  # what an arm touches needs no line of sight
@@ -118,24 +124,24 @@ def test_what_was_stopped_goes_on_to_the_same_files(plan: Path, tmp_path: Path) 
             unfinished = campaign.finish()
         assert step is not None
         assert f"next is {step.label}, {step.names[0]}" in unfinished.warnings[0].message
-        told: list[str] = []
-        arm(plan, part, tell=told.append, **given)
-        assert told[0].startswith(f"Going on after {stopped} entries")
+        messages: list[str] = []
+        arm(plan, part, tell=messages.append, **options)
+        assert messages[0].startswith(f"Going on after {stopped} entries")
         for name in (LOG, DATA):
             assert (part / name).read_bytes() == (whole / name).read_bytes()
     # What is finished stays as it is, and a torn line is said and measured again.
     log, before = (whole / LOG).read_bytes(), (whole / DATA).read_bytes()
-    assert arm(plan, whole, **given).finished
+    assert arm(plan, whole, **options).finished
     (whole / LOG).write_bytes(log[:-7])
-    (notice,) = [notice for notice in arm(plan, whole, **given).warnings if notice.code == "torn-line"]
+    (notice,) = [notice for notice in arm(plan, whole, **options).warnings if notice.code == "torn-line"]
     assert notice.level == "note"
     assert ((whole / LOG).read_bytes(), (whole / DATA).read_bytes()) == (log, before)
 
 
 def test_a_folder_that_began_otherwise_is_refused(plan: Path, tmp_path: Path) -> None:
     out, about = tmp_path / "out", tmp_path / "about.yaml"
-    said = "truearm: truearm-about/1\nunits: {}\ninstrument: {serial: %s}\n"
-    about.write_text(said % "A")
+    words = "truearm: truearm-about/1\nunits: {}\ninstrument: {serial: %s}\n"
+    about.write_text(words % "A")
     arm(plan, out, about=about)
     changes: tuple[tuple[dict[str, Any], str], ...] = (
         ({"targets": ["nest"], "nests": ["m"]}, "nests"),
@@ -148,7 +154,7 @@ def test_a_folder_that_began_otherwise_is_refused(plan: Path, tmp_path: Path) ->
         with pytest.raises(InputError, match=f"began with another {word}") as refusal:
             arm(plan, out, about=about, **change)
         assert refusal.value.parameter == "out"
-    about.write_text(said % "B")
+    about.write_text(words % "B")
     with pytest.raises(InputError, match="another instrument or robot"):
         arm(plan, out, about=about)
     changed = truearm.load_robot("irb120").with_values({"a_3": 0.271})
@@ -193,23 +199,23 @@ def test_rows_of_a_folder_become_the_same_file_as_the_import_of_the_table(
 
 def test_a_folder_into_which_nothing_comes_is_left_after_a_while(plan: Path, watching: dict[str, Any]) -> None:
     row = (watching["watch"] / "p.csv").rename(watching["out"].with_name("later.csv"))
-    found = truearm.measure(plan, "irb120", timeout=0.0, **watching)
-    assert (found.files, found.data) == ((), None)
-    assert "unfinished" in {notice.code for notice in found.warnings}
+    result = truearm.measure(plan, "irb120", timeout=0.0, **watching)
+    assert (result.files, result.data) == ((), None)
+    assert "unfinished" in {notice.code for notice in result.warnings}
     row.rename(watching["watch"] / "p.csv")
     assert truearm.measure(plan, "irb120", timeout=0.0, **watching).files == (DATA, PAGE)
 
 
 def test_ctrl_c_ends_with_what_is_there(plan: Path, watching: dict[str, Any]) -> None:
-    told: list[str] = []
+    messages: list[str] = []
 
     def tell(line: str) -> None:
-        told.append(line)
+        messages.append(line)
         threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT)).start()
 
-    found = truearm.measure(plan, "irb120", tell=tell, **watching)
-    assert len(told) == 1
-    assert found.files == (DATA, PAGE)
+    result = truearm.measure(plan, "irb120", tell=tell, **watching)
+    assert len(messages) == 1
+    assert result.files == (DATA, PAGE)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
@@ -230,10 +236,10 @@ def test_a_program_sends_readings_to_a_port(plan: Path, tmp_path: Path) -> None:
 
         threading.Thread(target=send, daemon=True).start()
 
-    found = truearm.measure(plan, "irb120", out=tmp_path / "out", listen=0, targets=["a"], timeout=10.0, tell=talk)
-    assert found.finished
-    assert len(found.session.kept) == 3
-    assert "token" not in found.command
+    result = truearm.measure(plan, "irb120", out=tmp_path / "out", listen=0, targets=["a"], timeout=10.0, tell=talk)
+    assert result.finished
+    assert len(result.session.kept) == 3
+    assert "token" not in result.command
 
 
 @pytest.mark.parametrize("device", VIRTUAL)
@@ -254,8 +260,8 @@ def test_every_virtual_instrument_reads_what_its_device_reads(device: str, tmp_p
             place, _ = campaign.placed.world_poses(campaign.joints[k : k + 1], entry.name)
             np.testing.assert_allclose(entry.reading.position, place[0], atol=1e-7)
             assert (entry.reading.quaternion is None) == (device in ("tracker", "measurement-arm"))
-        found = campaign.measured()
-        assert len(found.session.kept) >= 12
+        result = campaign.measured()
+        assert len(result.session.kept) >= 12
         assert sight(campaign) is None
 
 
@@ -264,16 +270,16 @@ MORE_ROWS = "".join(f"Q{k},{5 * k},10,20,{k},30,40\n" for k in range(9))
 
 def test_what_an_instrument_that_drifts_does_to_the_nests_is_said(plan: Path, tmp_path: Path) -> None:
     plan.write_text(MEASURED_PLAN + MORE_ROWS)
-    given: dict[str, Any] = {"nests": ["n1", "n2", "n3"], "noise": 1e-5}
-    found = arm(plan, tmp_path / "out", drift=3e-4, **given)
-    (notice,) = [n for n in found.warnings if n.code == "nests-moved"]
+    options: dict[str, Any] = {"nests": ["n1", "n2", "n3"], "noise": 1e-5}
+    result = arm(plan, tmp_path / "out", drift=3e-4, **options)
+    (notice,) = [n for n in result.warnings if n.code == "nests-moved"]
     assert notice.level == "warning"
-    drift = found.drift
+    drift = result.drift
     assert drift is not None
     assert drift.largest == pytest.approx(3e-4, rel=0.2)
     assert np.isfinite(drift.moved).all()
-    assert json.loads(json.dumps(found.summary()))["nests"]["rounds"] == len(drift.rounds)
-    assert "nests-moved" not in {n.code for n in arm(plan, tmp_path / "calm", **given).warnings}
+    assert json.loads(json.dumps(result.summary()))["nests"]["rounds"] == len(drift.rounds)
+    assert "nests-moved" not in {n.code for n in arm(plan, tmp_path / "calm", **options).warnings}
 
 
 def test_a_drift_of_one_nest_is_told_where_nothing_states_a_deviation(plan: Path, tmp_path: Path) -> None:
@@ -287,15 +293,15 @@ def test_a_drift_of_one_nest_is_told_where_nothing_states_a_deviation(plan: Path
                 x += drift * step.configuration / 11 if step.kind == "nests" else 100.0 * step.configuration
                 position = np.array([x, y, z]) * 1e-3
                 c._written(c.session.judged(Reading(step.names[0], 1.0, position, label=step.label)))
-            found = c.measured()
-        codes.append("nests-moved" in {notice.code for notice in found.warnings})
-        assert "No reading is corrected for it." in "\n".join(found.lines())
+            result = c.measured()
+        codes.append("nests-moved" in {notice.code for notice in result.warnings})
+        assert "No reading is corrected for it." in "\n".join(result.lines())
     assert codes == [False, True]
 
 
 def test_a_nest_behind_the_arm_or_a_box_is_left_out_and_told(planned: Path, tmp_path: Path) -> None:
-    given: dict[str, Any] = {"device": "tracker", "nests": ["n1", "n2", "n3"], "every": 2, "truth": "nominal"}
-    with open_campaign(planned, "irb120", tmp_path / "open", **given) as campaign:
+    options: dict[str, Any] = {"device": "tracker", "nests": ["n1", "n2", "n3"], "every": 2, "truth": "nominal"}
+    with open_campaign(planned, "irb120", tmp_path / "open", **options) as campaign:
         assert isinstance(campaign.source, VirtualInstrument)
         behind = [(k, name) for k, names in enumerate(campaign.source.hides) for name in names]
         assert behind
@@ -304,8 +310,8 @@ def test_a_nest_behind_the_arm_or_a_box_is_left_out_and_told(planned: Path, tmp_
         assert seen.names == ("n1", "n2", "n3")
         assert seen.visible.tolist() == [name not in campaign.source.hides[0] for name in seen.names]
         assert seen.outstanding.all()
-    found = truearm.measure(planned, "irb120", out=tmp_path / "open", **given)
-    left = [e for e in found.session.entries if e.event == "left" and e.is_nest]
+    result = truearm.measure(planned, "irb120", out=tmp_path / "open", **options)
+    left = [e for e in result.session.entries if e.event == "left" and e.is_nest]
     for entry in left:
         assert entry.words == "the arm is in the line of sight"
     boxes = tmp_path / "boxes.yaml"
@@ -313,12 +319,12 @@ def test_a_nest_behind_the_arm_or_a_box_is_left_out_and_told(planned: Path, tmp_
         "truearm: truearm-constraints/1\nunits: {length: mm, angle: deg}\n"
         "keep_out: {wall: {x: [-2000, 2000], y: [-3000, 3000], z: [-2000, -1900]}, shed: {z: [-1, 2000]}}\n"
     )
-    hidden = truearm.measure(planned, "irb120", out=tmp_path / "shed", constraints=boxes, **given)
+    hidden = truearm.measure(planned, "irb120", out=tmp_path / "shed", constraints=boxes, **options)
     assert hidden.drift is None
     (notice,) = [n for n in hidden.warnings if n.code == "nests-missed"]
     assert "the box 'shed' is in the line of sight" in notice.message
     with pytest.raises(InputError, match="another source of readings"):
-        truearm.measure(planned, "irb120", out=tmp_path / "shed", **given)
+        truearm.measure(planned, "irb120", out=tmp_path / "shed", **options)
 
 
 #: Joint positions [deg] of an IRB 120 at which a device reads its target, at which it reads none, and why not.
@@ -362,8 +368,8 @@ def test_what_an_instrument_does_not_see_of_a_plan_is_counted_before_the_first_r
 def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is_not_judged(
     planned: Path, tmp_path: Path
 ) -> None:
-    given: dict[str, Any] = {"device": "tracker", "truth": "nominal"}
-    with open_campaign(planned, "irb120", tmp_path / "all", **given) as campaign:
+    options: dict[str, Any] = {"device": "tracker", "truth": "nominal"}
+    with open_campaign(planned, "irb120", tmp_path / "all", **options) as campaign:
         (notice,) = [one for one in campaign.notices if one.code == "not-seen"]
         assert isinstance(campaign.source, VirtualInstrument)
         names = np.array(campaign.session.targets)
@@ -371,7 +377,7 @@ def test_a_plan_that_says_what_is_read_asks_for_no_more_and_a_real_instrument_is
     assert notice.level == "note"
     assert f"{sum(map(len, seen))} of 72 pairs of configuration and target can be read, some at every" in notice.message
     path = with_reads(planned, tmp_path / "reads.csv", ["; ".join(at) for at in seen])
-    with open_campaign(path, "irb120", tmp_path / "reads", **given) as campaign:
+    with open_campaign(path, "irb120", tmp_path / "reads", **options) as campaign:
         assert "not-seen" not in {one.code for one in campaign.notices}
     few = plan_of(tmp_path, "180,0,0,0,0,0")
     with open_campaign(few, "irb120", tmp_path / "port", listen=0, targets=["1"]) as campaign:
@@ -383,9 +389,9 @@ def test_the_column_reads_of_a_plan_says_what_is_asked_for(planned: Path, tmp_pa
     for targets, count in ((["1", "2", "3"], 1 + 2 * 23), (["smr"], 24), (["2", "smr"], 25)):
         with open_campaign(path, "irb120", tmp_path / targets[0] / str(count), listen=0, targets=targets) as campaign:
             assert campaign.session.outstanding == count
-    found = truearm.measure(path, "irb120", out=tmp_path / "virtual", device="tracker", targets=["1", "2", "3"])
-    first = found.session.labels[0]
-    assert not [e for e in found.session.kept if e.name == "2" and e.label != first]  # nobody asked for it
+    result = truearm.measure(path, "irb120", out=tmp_path / "virtual", device="tracker", targets=["1", "2", "3"])
+    first = result.session.labels[0]
+    assert not [e for e in result.session.kept if e.name == "2" and e.label != first]  # nobody asked for it
 
 
 def test_lengths_that_cannot_be_meant_are_told(plan: Path, tmp_path: Path) -> None:
@@ -394,32 +400,32 @@ def test_lengths_that_cannot_be_meant_are_told(plan: Path, tmp_path: Path) -> No
             places = campaign.robot.world_poses(campaign.joints)[0] * 1e3  # as a number, in mm
             for label, place in zip(campaign.session.labels, places, strict=True):
                 campaign._written(campaign.session.judged(Reading("a", 1.0, place * metres, label=label)))
-            found = [n for n in campaign.measured().warnings if n.code == "units-unlikely"]
-        assert bool(found) == told, unit
-        assert all(n.level == "warning" and "Check the unit of lengths" in n.message for n in found)
+            warnings = [n for n in campaign.measured().warnings if n.code == "units-unlikely"]
+        assert bool(warnings) == told, unit
+        assert all(n.level == "warning" and "Check the unit of lengths" in n.message for n in warnings)
 
 
 def test_an_instrument_without_noise_reads_the_twin_that_is_simulated(planned: Path, tmp_path: Path) -> None:
-    found = truearm.measure(planned, "irb120", out=tmp_path, device="tracker", seed=5, noise=0.0).data
+    result = truearm.measure(planned, "irb120", out=tmp_path, device="tracker", seed=5, noise=0.0).data
     simulated = truearm.simulate("irb120", truth="random", seed=5, poses=planned, noise=0.0).data
-    assert found is not None
+    assert result is not None
     places = {
         (simulated.labels[c], simulated.targets[t]): place
         for c, t, place in zip(simulated.configuration, simulated.target, simulated.position, strict=True)
     }
-    assert found.has_position.sum() >= 24
-    for c, t, place in zip(found.configuration, found.target, found.position, strict=True):
+    assert result.has_position.sum() >= 24
+    for c, t, place in zip(result.configuration, result.target, result.position, strict=True):
         if np.isfinite(place).all():
-            np.testing.assert_allclose(place, places[found.labels[c], found.targets[t]], atol=1e-12)
+            np.testing.assert_allclose(place, places[result.labels[c], result.targets[t]], atol=1e-12)
 
 
 def test_the_page_says_the_whole_call_and_no_token(plan: Path, tmp_path: Path) -> None:
-    found = arm(plan, tmp_path / "out", seed=3, disturbed=0.2, most_deviation=1e-3)
-    assert found.command == (
+    result = arm(plan, tmp_path / "out", seed=3, disturbed=0.2, most_deviation=1e-3)
+    assert result.command == (
         f"truearm.measure({str(plan)!r}, 'irb120', out={str(tmp_path / 'out')!r}, device='measurement-arm', seed=3, "
         "disturbed=0.2, nests=['n'], every=2, most_deviation=0.001)"
     )
-    again = eval(found.command.replace(str(tmp_path / "out"), str(tmp_path / "again")), {"truearm": truearm})
+    again = eval(result.command.replace(str(tmp_path / "out"), str(tmp_path / "again")), {"truearm": truearm})
     assert (tmp_path / "again" / DATA).read_bytes() == (tmp_path / "out" / DATA).read_bytes()
     assert again.finished
     with open_campaign(plan, "irb120", tmp_path / "port", listen=0, token="x" * 20, targets=["a"]) as campaign:
@@ -427,10 +433,10 @@ def test_the_page_says_the_whole_call_and_no_token(plan: Path, tmp_path: Path) -
 
 
 def test_a_point_of_which_no_reading_can_be_kept_is_left_out_after_twenty(plan: Path, tmp_path: Path) -> None:
-    found = arm(plan, tmp_path / "out", most_settling=0.0, nests=[])
-    assert found.session.aside_by_reason == {"not-settled": 60}
-    assert len(found.session.left_out) == 3
-    assert found.files == ()
+    result = arm(plan, tmp_path / "out", most_settling=0.0, nests=[])
+    assert result.session.aside_by_reason == {"not-settled": 60}
+    assert len(result.session.left_out) == 3
+    assert result.files == ()
 
 
 REFUSED: tuple[tuple[dict[str, Any], str, str], ...] = (
@@ -457,9 +463,9 @@ REFUSED: tuple[tuple[dict[str, Any], str, str], ...] = (
 
 
 def test_what_cannot_be_measured_is_refused_before_anything_is_begun(plan: Path, tmp_path: Path) -> None:
-    for given, parameter, word in REFUSED:
+    for value, parameter, word in REFUSED:
         with pytest.raises(InputError) as refusal:
-            arm(plan, tmp_path / "out", **given)
+            arm(plan, tmp_path / "out", **value)
         assert word in str(refusal.value)
         assert refusal.value.parameter == parameter
         assert not (tmp_path / "out").exists()
@@ -507,7 +513,7 @@ def test_a_virtual_robot_comes_from_the_stops_of_the_plan(plan: Path, tmp_path: 
     ahead = [",".join([row[0], *(repr(float(cell) + float(np.degrees(lag))) for cell in row[1:])]) for row in table]
     plan.write_text("\n".join([header, *ahead]) + "\n")
     there = arm(plan, tmp_path / "ahead", truth="nominal", noise=1e-9, nests=[])
-    places = [[e.reading.position for e in found.session.kept if e.reading] for found in (came, there)]
+    places = [[e.reading.position for e in result.session.kept if e.reading] for result in (came, there)]
     np.testing.assert_allclose(places[0], places[1], atol=1e-12)
     assert came.data is not None
     assert came.data.number.tolist() == list(range(1, 2 * len(table), 2))

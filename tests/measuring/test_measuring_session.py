@@ -28,19 +28,19 @@ def session(targets: Iterable[str] = ("a", "b"), nests: Iterable[str] = (), ever
 def taken(of: Session, name: str, label: str | None = None, *, x: float | None = None, **more: Any) -> Entry:
     """Take a reading whose place is another one each time, and return what became of it."""
     place = np.array([0.1 + 0.01 * len(of) if x is None else x, 0.2, 0.3])
-    given = {"time": 10.0 * len(of), "samples": 20, "deviation": 1e-5, "settling": 1e-5} | more
-    entry = of.judged(Reading(name, position=place, label=label, **given))
+    options = {"time": 10.0 * len(of), "samples": 20, "deviation": 1e-5, "settling": 1e-5} | more
+    entry = of.judged(Reading(name, position=place, label=label, **options))
     of.add(entry)
     return entry
 
 
-def told(of: Session, code: str) -> tuple[str, str]:
+def notice_of(of: Session, code: str) -> tuple[str, str]:
     """Return the level and the words of the one notice with this code."""
     (notice,) = [notice for notice in session_notices(of) if notice.code == code]
     return notice.level, notice.message
 
 
-def kept(of: Session, stops: Configurations | None = None) -> Dataset:
+def stored_readings(of: Session, stops: Configurations | None = None) -> Dataset:
     data = kept_readings(of, replace(plan(of.labels), before=stops), "kept")
     assert data is not None
     return data
@@ -90,10 +90,10 @@ def test_a_reading_of_another_configuration_is_kept_where_it_belongs() -> None:
     assert step is not None
     assert step.label == "P1"
     taken(of, "a", "P1")
-    level, words = told(of, "other-order")
+    level, words = notice_of(of, "other-order")
     assert level == "note"
     assert "P1" in words
-    data = kept(of)
+    data = stored_readings(of)
     assert data.labels == ("P3", "P1")
     assert "order" in csv_text(data)
     assert data.number is not None
@@ -101,7 +101,7 @@ def test_a_reading_of_another_configuration_is_kept_where_it_belongs() -> None:
     # Stops before the configurations count in the order.
     of = session(targets=("a",))
     through(of)
-    data = kept(of, plan())
+    data = stored_readings(of, plan())
     assert data.number is not None
     assert data.approach is not None
     assert data.number.tolist() == list(range(1, 2 * len(LABELS), 2))
@@ -113,7 +113,7 @@ def test_nests_that_are_passed_over_or_hidden_are_counted_and_told() -> None:
     for label in LABELS[:3]:
         taken(of, "a", label)
     assert of.missed_rounds == 1
-    assert told(of, "nests-missed")[0] == "warning"
+    assert notice_of(of, "nests-missed")[0] == "warning"
     step = of.next
     assert step is not None
     assert step.names == ("n",)  # the second round is still to be measured
@@ -121,7 +121,7 @@ def test_nests_that_are_passed_over_or_hidden_are_counted_and_told() -> None:
     of.add(of.leave_out("P1", "n1", "the arm is in the line of sight"))
     through(of)
     assert (of.done, of.missed_rounds, of.left_out) == (True, 1, ())
-    level, words = told(of, "nests-missed")
+    level, words = notice_of(of, "nests-missed")
     assert level == "warning"
     assert "In 1 of 3 rounds" in words
     assert "Left out: n1 at P1 (the arm is in the line of sight)." in words
@@ -153,7 +153,7 @@ def test_targets_left_out_at_most_configurations_are_told_and_one_of_two_seen_at
         of.add(of.leave_out(label, name, "the tracker does not see it"))
     assert "many-left-out" not in {n.code for n in session_notices(of)}
     of.add(of.leave_out("P3", "a", "the tracker does not see it"))
-    level, words = told(of, "many-left-out")
+    level, words = notice_of(of, "many-left-out")
     assert level == "warning"
     assert "At 3 of 4 configurations" in words
     assert "7 of 8 readings of targets are missing" in words
@@ -213,16 +213,18 @@ def test_every_reading_stays_with_its_reason() -> None:
     other.add(of.entries[0])
     with pytest.raises(InputError, match="does not follow"):
         other.add(Entry(2, "aside", "P1", "b", reason="operator", of=1))
+    with pytest.raises(InputError, match="number 5: this does not follow"):
+        other.add(Entry(5, "aside", "P1", "a", reason="operator", of=4))  # the reading that it takes back is missing
 
 
 def test_readings_of_which_nothing_is_told_are_kept_and_a_clock_that_goes_back_is_told() -> None:
     of = session()
     taken(of, "a", samples=None, deviation=None, settling=None)
-    level, words = told(of, "not-judged")
+    level, words = notice_of(of, "not-judged")
     assert level == "note"
     assert "1 of 1" in words
     taken(of, "b", time=-5.0)
-    assert "reading 2" in told(of, "clock-back")[1]
+    assert "reading 2" in notice_of(of, "clock-back")[1]
 
 
 def test_words_of_the_operator_that_cannot_be_are_refused() -> None:
@@ -261,7 +263,7 @@ def test_the_figures_of_a_dwell() -> None:
 def test_kept_readings_are_a_file_that_reads_back(tmp_path: Any) -> None:
     of = session(nests=("n",))
     through(of)
-    data = kept(of)
+    data = stored_readings(of)
     assert (data.configurations, len(data.target)) == (4, 8)
     assert data.references is not None
     assert data.references.targets == ("n",)
@@ -278,7 +280,7 @@ def test_what_was_not_measured_is_missing_or_not_there() -> None:
     assert taken(of, "b", "P1", x=np.nan).reason == "no-reading"
     assert of.left_out == (("P1", "b"),)
     taken(of, "b")
-    data = kept(of)
+    data = stored_readings(of)
     assert data.labels == ("P1", "P2")  # nobody came to the others
     assert data.has_position.tolist() == [True, False, False, True]
 
@@ -289,7 +291,7 @@ def test_a_configuration_to_which_the_robot_comes_again_has_visits() -> None:
     taken(of, "b", "P1", breaks=1)
     taken(of, "a", "P2")
     taken(of, "b", "P1")
-    data = kept(of)
+    data = stored_readings(of)
     assert data.visit is not None
     assert data.visit.tolist() == [1, 2, 1, 1]
 
@@ -306,18 +308,18 @@ def test_the_deviation_is_the_instruments_or_that_of_the_nests_and_never_that_of
     while (step := of.next) is not None:
         place = 2e-5 * rng.standard_normal(3) + (1.0 if step.names[0] == "n1" else 2.0)
         of.add(of.judged(Reading(step.names[0], 1.0, place, label=step.label, deviation=1e-6)))
-    found = stated_sigma(of).value
-    assert found == pytest.approx(2e-5, rel=0.1)
-    data = kept(of)
+    result = stated_sigma(of).value
+    assert result == pytest.approx(2e-5, rel=0.1)
+    data = stored_readings(of)
     assert data.sigma is not None
-    assert set(data.sigma.tolist()) == {found}
+    assert set(data.sigma.tolist()) == {result}
 
 
 def test_the_drift_of_nests_is_what_they_moved() -> None:
     without = session()
     taken(without, "a")
     assert nest_drift(without) is None
-    assert told(without, "no-nests")
+    assert notice_of(without, "no-nests")
     of = session(targets=("a",), nests=("n1", "n2"), every=1)
     moved = 0.0
     while (step := of.next) is not None:
@@ -345,9 +347,9 @@ def test_one_nest_tells_its_scatter_from_round_to_round_and_a_drift_beside_it() 
             place = 1e-5 * rng.standard_normal(3) + (1.0 if step.names[0] == "n" else 2.0)
             place[0] += drift * step.configuration / 11
             of.add(of.judged(Reading(step.names[0], 1.0, place, label=step.label)))
-        found = nest_drift(of)
-        assert found is not None
-        noise = found.noise()
+        result = nest_drift(of)
+        assert result is not None
+        noise = result.noise()
         assert noise is not None
         assert 0.7e-5 < noise < most
     few = session(nests=("n",))

@@ -41,9 +41,9 @@ def entry(number: int, *, reason: str = "") -> Entry:
     return Entry(number, "reading", f"P{number}", reading.name, bool(number % 2), reading, reason, "Träger; 0.1 mm")
 
 
-def same(one: Entry, other: Entry) -> bool:
+def same(first: Entry, other: Entry) -> bool:
     """Return whether two entries hold the same to the last digit."""
-    a, b = dict(one.__dict__), dict(other.__dict__)
+    a, b = dict(first.__dict__), dict(other.__dict__)
     x, y = a.pop("reading"), b.pop("reading")
     if a != b or (x is None) != (y is None):
         return False
@@ -80,9 +80,9 @@ def read(folder: Path) -> tuple[Entry, ...]:
 
 def test_what_is_written_is_read_again_to_the_last_digit(tmp_path: Path) -> None:
     write(tmp_path)
-    found = read(tmp_path)
-    assert len(found) == len(ENTRIES)
-    assert all(same(a, b) for a, b in zip(found, ENTRIES, strict=True))
+    result = read(tmp_path)
+    assert len(result) == len(ENTRIES)
+    assert all(same(a, b) for a, b in zip(result, ENTRIES, strict=True))
 
 
 def test_a_part_of_a_line_at_the_end_is_cut_off(tmp_path: Path) -> None:
@@ -99,17 +99,19 @@ def test_a_part_of_a_line_at_the_end_is_cut_off(tmp_path: Path) -> None:
         assert path.read_bytes() == whole
 
 
-def test_a_line_that_was_changed_or_says_nothing_is_refused_with_its_number(tmp_path: Path) -> None:
+def test_a_line_that_is_missing_changed_or_says_nothing_is_refused_with_its_number(tmp_path: Path) -> None:
     write(tmp_path)
     path = tmp_path / LOG
     lines = path.read_text().splitlines(keepends=True)
     body = "6,guess,,P1,a,target,,,,,,,,,,,,,,,,,,"
-    for changed, said in (
+    for changed, words in (
         ([*lines[:2], lines[2].replace("P2", "P3", 1), *lines[3:]], "line 3: this line is not as it was written"),
+        ([*lines[:2], *lines[3:]], "line 3: lines before this one are missing.*; got 'number 3'; allowed: number 2"),
+        ([*lines[:3], *lines[2:]], "line 4: .* or stand there twice; got 'number 2'; allowed: number 3"),
         ([*lines, f"{body},{zlib.crc32(body.encode()):08x}\n"], "line 7: this line cannot be understood"),
     ):
         path.write_text("".join(changed))
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=words):
             ReadingLog(tmp_path)
 
 
@@ -151,8 +153,8 @@ def test_one_process_at_a_time_has_it_and_names_that_would_break_a_line_are_esca
     odd = Reading("a\nb", 0.0, np.full(3, np.nan))
     log.append(Entry(1, "reading", "", odd.name, reading=odd, reason="unknown-name"))
     log.close()
-    (found,) = read(tmp_path)
-    assert (found.name, found.reason, found.label) == (r"a\nb", "unknown-name", "")
+    (result,) = read(tmp_path)
+    assert (result.name, result.reason, result.label) == (r"a\nb", "unknown-name", "")
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="a process cannot copy itself here")

@@ -45,7 +45,7 @@ class Folder:
         self.campaign = self.opened()
 
     def opened(self) -> Campaign:
-        source = WatchedFolder(self.inside, self.place / "map.yaml", LABELS, now=lambda: 7.0)
+        source = WatchedFolder(self.inside, self.place / "map.yaml", LABELS, clock=lambda: 7.0)
         quality = Quality(deviation=5e-5, samples=5)
         return Campaign(Session(LABELS, self.targets, ("n1",), 2, quality), source, self.out)
 
@@ -66,7 +66,7 @@ class Folder:
 
 
 @pytest.fixture
-def made(tmp_path: Path) -> Iterator[Callable[..., Folder]]:
+def make_folder(tmp_path: Path) -> Iterator[Callable[..., Folder]]:
     """Make watched folders, and let go of their logs at the end."""
     folders: list[Folder] = []
 
@@ -80,8 +80,8 @@ def made(tmp_path: Path) -> Iterator[Callable[..., Folder]]:
 
 
 @pytest.fixture
-def watched(made: Callable[..., Folder]) -> Folder:
-    return made()
+def watched(make_folder: Callable[..., Folder]) -> Folder:
+    return make_folder()
 
 
 def test_rows_are_read_as_they_come_and_half_a_line_waits(watched: Folder) -> None:
@@ -101,8 +101,8 @@ def test_rows_are_read_as_they_come_and_half_a_line_waits(watched: Folder) -> No
     assert reading.origin == "points.csv, line 3"
 
 
-def test_a_mapping_needs_no_joints_where_the_plan_has_them(made: Callable[..., Folder], tmp_path: Path) -> None:
-    watched = made(MAPPING.replace("joints: {file: plan.csv}\n", ""))
+def test_a_mapping_needs_no_joints_where_the_plan_has_them(make_folder: Callable[..., Folder], tmp_path: Path) -> None:
+    watched = make_folder(MAPPING.replace("joints: {file: plan.csv}\n", ""))
     watched.write(HEADER + row("P1", "n1") + row("P1", "a"))
     assert watched.step() == ["P1/n1", "P1/a"]
     # But other joints, or a sheet, do not go with a plan and with text.
@@ -139,12 +139,12 @@ def test_a_broken_row_is_named_and_the_others_are_kept(watched: Folder) -> None:
     broken = ("P2,a,oops,2,3,2026-11-23 10:00:01,0.01,20,0\n", 'P2,"a,1,2\n', "P2,a,1\n", row("P2", "a", "nan"))
     watched.write(HEADER + row("P1", "a") + "".join(broken) + row("P3", "a", 4.0))
     assert watched.step() == ["P1/a", "P3/a"]
-    said = watched.campaign.source.told()
-    assert [f"points.csv, line {n}" in text for n, text in zip((3, 4, 5, 6), said, strict=True)] == [True] * 4
+    messages = watched.campaign.source.messages()
+    assert [f"points.csv, line {n}" in text for n, text in zip((3, 4, 5, 6), messages, strict=True)] == [True] * 4
     (notice,) = watched.campaign.source.notices
     assert notice.code == "rows-broken"
     assert "4 rows could not be read" in notice.message
-    assert watched.campaign.source.told() == []
+    assert watched.campaign.source.messages() == []
 
 
 def test_every_fault_that_the_table_tells_sets_its_row_aside(watched: Folder) -> None:
@@ -237,7 +237,7 @@ def test_a_folder_that_goes_away_is_told_and_one_that_is_not_there_is_refused(wa
     assert refusal.value.parameter == "watch"
 
 
-def test_wide_tables_without_labels_count_their_rows(made: Callable[..., Folder]) -> None:
+def test_wide_tables_without_labels_count_their_rows(make_folder: Callable[..., Folder]) -> None:
     mapping = """\
 truearm: truearm-mapping/1
 layout: {delimiter: semicolon, decimal: comma, header: 2, comment: '#', encoding: utf-16}
@@ -249,15 +249,15 @@ readings:
   - {target: b, x: X2, y: Y2, z: Z2}
 joints: {file: plan.csv}
 """
-    of = made(mapping, ("a", "b"))
+    of = make_folder(mapping, ("a", "b"))
     text = "any\nX1;Y1;Z1;X2;Y2;Z2\n1,5;2;3;4;5;6\n# a remark\n1;2;x;4;5;7\n\n7;8;9;-;-;-\n8;8;9;1;1;1\n"
     (of.inside / "wide.csv").write_bytes(text.encode("utf-16"))
     beyond = [f"row 4/{name} unknown-configuration" for name in "ab"]
     assert of.step() == ["P1/a", "P1/b", "P3/a", "P3/b no-reading", *beyond]
-    assert "line 5" in of.campaign.source.told()[0]
+    assert "line 5" in of.campaign.source.messages()[0]
 
 
-def test_poses_are_read_and_wrong_quaternions_named(made: Callable[..., Folder]) -> None:
+def test_poses_are_read_and_wrong_quaternions_named(make_folder: Callable[..., Folder]) -> None:
     mapping = """\
 truearm: truearm-mapping/1
 configuration: {column: Pose}
@@ -265,7 +265,7 @@ length_unit: m
 readings: [{target: a, x: X, y: Y, z: Z, qw: W, qx: I, qy: J, qz: K, sigma: {columns: [S], unit: mm}}]
 joints: {file: plan.csv}
 """
-    of = made(mapping)
+    of = make_folder(mapping)
     of.write("Pose,X,Y,Z,W,I,J,K,S\nP1,1,2,3,0.6,0.8,0,0,0.02\nP2,1,2,4,0.5,0,0,0,0.02\n")
     assert of.step() == ["P1/a"]
     reading = of.campaign.session.entries[0].reading
@@ -274,4 +274,4 @@ joints: {file: plan.csv}
     assert reading.quaternion.tolist() == [0.6, 0.8, 0.0, 0.0]
     assert reading.sigma == pytest.approx(2e-5)
     assert reading.time == 7.0
-    assert "length 1" in of.campaign.source.told()[0]
+    assert "length 1" in of.campaign.source.messages()[0]

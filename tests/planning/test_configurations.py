@@ -81,15 +81,15 @@ def test_a_twin_comes_to_a_plan_as_the_robot_does_that_drives_its_ways(name: str
     planned = truearm.plan(name, poses=12, candidates=80, clearance=0.02, out=table)
     assert planned.tour is not None
     arm = truearm.load_robot(name).with_effects(["approach"])
-    truth = arm.with_values({one: 2e-3 for one in arm.parameters if one.startswith("approach_")})
-    made = truearm.simulate(name, truth=truth, poses=table, noise=0.0, out=file)
-    assert made.lines()[2].startswith("Before each the arm stopped at its approach_i;")
+    truth = arm.with_values({parameter: 2e-3 for parameter in arm.parameters if parameter.startswith("approach_")})
+    simulation = truearm.simulate(name, truth=truth, poses=table, noise=0.0, out=file)
+    assert simulation.lines()[2].startswith("Before each the arm stopped at its approach_i;")
     twin = truth_twin(planned.made.robot, truth, np.random.default_rng(0))
     stops = planned.tour.stops
     driven = measure(twin, np.array([stop.joints for stop in stops]), 0.0, np.random.default_rng(0))
     rows = [row for row, stop in enumerate(stops) if stop.kind == "measure"]
     every = driven.position.reshape(len(stops), -1, 3)[rows].reshape(-1, 3)
-    assert made.data.position == pytest.approx(every, abs=1e-12)
+    assert simulation.data.position == pytest.approx(every, abs=1e-12)
     joints = np.array([stops[row].joints for row in rows])
     straight = measure(twin, joints, 0.0, np.random.default_rng(0))
     assert np.abs(straight.position - every).max() > 1e-4  # from the configuration before it stands elsewhere
@@ -105,10 +105,10 @@ def test_a_program_without_stops_before_has_a_plan_without_them(tmp_path: Path) 
     table = tmp_path / "made" / "plan.csv"
     assert "approach" not in table.read_text()
     assert read_stops(table) is None
-    made = truearm.simulate("irb120", truth="nominal", poses=table, noise=0.0)
-    assert (len(made.lines()), made.stopped_before) == (2, False)
-    assert made.data.number is not None
-    assert made.data.number.tolist() == list(range(10))
+    simulation = truearm.simulate("irb120", truth="nominal", poses=table, noise=0.0)
+    assert (len(simulation.lines()), simulation.stopped_before) == (2, False)
+    assert simulation.data.number is not None
+    assert simulation.data.number.tolist() == list(range(10))
 
 
 @pytest.mark.parametrize(

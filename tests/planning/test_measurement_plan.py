@@ -25,7 +25,7 @@ POLISHING = Path(__file__).parents[1] / "engine" / "programs" / "samples" / "rap
 MODEL = {model.name: model for model in MODELS}
 
 
-def made(poses: int | None = 20, candidates: int = 300, **options: object) -> MeasurementPlan:
+def planned_with(poses: int | None = 20, candidates: int = 300, **options: object) -> MeasurementPlan:
     rng = np.random.default_rng(0)
     arm = with_targets(load_robot("irb120"))
     return plan_measurements(
@@ -40,7 +40,7 @@ def made(poses: int | None = 20, candidates: int = 300, **options: object) -> Me
 
 @pytest.fixture(scope="module")
 def plan() -> MeasurementPlan:
-    return made()
+    return planned_with()
 
 
 @pytest.fixture
@@ -55,12 +55,12 @@ def test_a_plan_is_better_than_chance_and_within_limits(plan: MeasurementPlan) -
     assert plan.joints.shape == (20, 6)
     assert len(set(plan.chosen.tolist())) == 20
     assert ((plan.joints >= low) & (plan.joints <= high)).all()
-    told = plan.prediction
-    assert (told.chosen < told.random).all()
-    assert (np.diff(told.chosen) < 0).all()
-    assert told.floor < told.planned < told.random[0]
-    assert told.sufficient_number is not None
-    assert told.chosen[told.numbers.tolist().index(told.sufficient_number)] <= 1.1 * told.floor
+    predicted = plan.prediction
+    assert (predicted.chosen < predicted.random).all()
+    assert (np.diff(predicted.chosen) < 0).all()
+    assert predicted.floor < predicted.planned < predicted.random[0]
+    assert predicted.sufficient_number is not None
+    assert predicted.chosen[predicted.numbers.tolist().index(predicted.sufficient_number)] <= 1.1 * predicted.floor
 
 
 def test_every_joint_comes_from_below(plan: MeasurementPlan) -> None:
@@ -90,16 +90,16 @@ def test_what_cannot_be_told_apart_is_named(plan: MeasurementPlan) -> None:
 
 @pytest.mark.usefixtures("few_numbers")
 def test_each_objective_is_best_by_its_own_measure() -> None:
-    plans = {name: made(candidates=80, objective=name) for name in ("O1", "O3", "O5")}
+    plans = {name: planned_with(candidates=80, objective=name) for name in ("O1", "O3", "O5")}
     for name, plan in plans.items():
         assert plan.indices[name] == max(other.indices[name] for other in plans.values())
 
 
 def test_the_same_seed_gives_the_same_plan(plan: MeasurementPlan) -> None:
-    again = made()
+    again = planned_with()
     assert np.array_equal(plan.joints, again.joints)
-    told, told_again = (Plan(one, "").summary() | {"seconds": 0} for one in (plan, again))
-    assert told == told_again
+    summary, summary_again = (Plan(planned, "").summary() | {"seconds": 0} for planned in (plan, again))
+    assert summary == summary_again
 
 
 @pytest.mark.usefixtures("few_numbers")
@@ -112,7 +112,7 @@ def test_constraints_are_counted_and_kept() -> None:
             "floor": 0,
         }
     )
-    plan = made(constraints=rules)
+    plan = planned_with(constraints=rules)
     assert set(plan.rejected) == {"limits", "moment_2", "floor"}
     assert plan.rejected["limits"] == 0
     assert (
@@ -120,14 +120,14 @@ def test_constraints_are_counted_and_kept() -> None:
     )
     tight = rules.model_copy(update={"floor": 900.0})
     with pytest.raises(InputError, match=r"(?s)too few.*rejected by moment_2 \d+, floor \d\d\d"):
-        made(constraints=tight)
+        planned_with(constraints=tight)
 
 
 @pytest.mark.usefixtures("few_numbers")
 def test_auto_takes_eleven_or_more() -> None:
-    plan = made(poses=None, candidates=60)
+    plan = planned_with(poses=None, candidates=60)
     assert 11 <= len(plan.joints) <= 60
-    assert plan.indices["O1"] >= made(poses=11, candidates=60).indices["O1"]
+    assert plan.indices["O1"] >= planned_with(poses=11, candidates=60).indices["O1"]
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_auto_takes_eleven_or_more() -> None:
 )
 def test_what_cannot_be_planned_is_refused(options: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=f"(?s){words}"):
-        made(**options)  # type: ignore[arg-type]
+        planned_with(**options)  # type: ignore[arg-type]
 
 
 def test_a_temperature_is_in_no_plan() -> None:
@@ -167,7 +167,7 @@ def test_where_the_robot_stands_does_not_matter() -> None:
     rng = np.random.default_rng(0)
     q = random_candidates(arm, 200, rng)
     plans = [
-        plan_measurements(one, q, MODEL["geometric"], poses=15, rng=np.random.default_rng(1)) for one in (arm, away)
+        plan_measurements(robot, q, MODEL["geometric"], poses=15, rng=np.random.default_rng(1)) for robot in (arm, away)
     ]
     assert plans[0].indices["O1"] == pytest.approx(plans[1].indices["O1"], rel=0.01)
 
@@ -188,11 +188,11 @@ def test_the_predicted_error_comes_true() -> None:
         errors.append(np.linalg.norm(np.stack(seen) + noise * rng.normal(size=(3, 40, 3)), axis=2).mean())
     arm = with_targets(nominal)
     rng = np.random.default_rng(1)
-    where = random_candidates(arm, 15, rng), random_candidates(arm, 200, rng)
-    measured, elsewhere = (sensitivity(arm, one, MODEL["geometric"].free(arm), noise) for one in where)
-    told = predict(arm, measured, np.arange(15), elsewhere, where[1].joints, noise, rng)
-    assert told.planned == pytest.approx(np.mean(errors), rel=0.1)
-    assert told.planned > 1.1 * told.floor
+    candidates = random_candidates(arm, 15, rng), random_candidates(arm, 200, rng)
+    measured, elsewhere = (sensitivity(arm, postures, MODEL["geometric"].free(arm), noise) for postures in candidates)
+    predicted = predict(arm, measured, np.arange(15), elsewhere, candidates[1].joints, noise, rng)
+    assert predicted.planned == pytest.approx(np.mean(errors), rel=0.1)
+    assert predicted.planned > 1.1 * predicted.floor
 
 
 @pytest.mark.usefixtures("few_numbers")
@@ -224,13 +224,13 @@ def test_configurations_chosen_for_a_program_on_ten_robots() -> None:
             for campaign in range(3):
                 data = measure(twin, plan.joints, 1e-4, np.random.default_rng(100 * campaign + seed))
                 fit = identify(nominal, data, model).robot
-                found = [fit.world_poses(targets, name)[0] for name in data.targets]
-                error[objective] += float(np.linalg.norm(np.array(found) - true, axis=2).mean())
+                positions = [fit.world_poses(targets, name)[0] for name in data.targets]
+                error[objective] += float(np.linalg.norm(np.array(positions) - true, axis=2).mean())
         ratios.append(error["error"] / error["O1"])
-    there = plans["error"].prediction.there
-    assert there is not None
-    assert there.by_o1 is not None
-    assert float(there.error.mean() / there.by_o1.mean()) <= 0.8
+    at_targets = plans["error"].prediction.there
+    assert at_targets is not None
+    assert at_targets.by_o1 is not None
+    assert float(at_targets.error.mean() / at_targets.by_o1.mean()) <= 0.8
     assert np.median(ratios) <= 0.8
     assert plans["O1"].prediction.there is not None
-    assert plans["O1"].prediction.there.error.mean() == pytest.approx(there.by_o1.mean())
+    assert plans["O1"].prediction.there.error.mean() == pytest.approx(at_targets.by_o1.mean())

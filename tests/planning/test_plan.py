@@ -29,12 +29,12 @@ def test_a_plan_in_json_and_in_its_files(truearm: Truearm, tmp_path: Path) -> No
     rules, out = tmp_path / "rules.yaml", tmp_path / "plan.csv"
     rules.write_text(RULES)
     words = ("plan", "irb120", "--poses", 15, "--candidates", 400, "--constraints", rules, "--out", out, "--json")
-    told = json.loads(truearm(*words).out)
-    assert {"poses", "indices", "candidates", "rejected", "seconds"} <= set(told)
-    assert (told["poses"], told["candidates"]) == (15, 400)
-    assert list(told["indices"]) == ["O1", "O2", "O3", "O4", "O5"]
-    assert set(told["rejected"]) == {"limits", "moment_2", "floor"}
-    assert told["prediction"]["floor_mm"] < told["prediction"]["planned_mm"]
+    summary = json.loads(truearm(*words).out)
+    assert {"poses", "indices", "candidates", "rejected", "seconds"} <= set(summary)
+    assert (summary["poses"], summary["candidates"]) == (15, 400)
+    assert list(summary["indices"]) == ["O1", "O2", "O3", "O4", "O5"]
+    assert set(summary["rejected"]) == {"limits", "moment_2", "floor"}
+    assert summary["prediction"]["floor_mm"] < summary["prediction"]["planned_mm"]
     rows = rows_of(out)
     assert [row["configuration"] for row in rows] == [str(k + 1) for k in range(15)]
     assert (list(rows[0])[1], list(rows[0])[-1]) == ("joint_1 [deg]", "approach_6 [deg]")
@@ -126,8 +126,12 @@ def test_a_plan_is_written_into_a_folder_with_its_program(truearm: Truearm, tmp_
     assert "WaitDI di3,1\\MaxTime:=60\\TimeFlag:=late;" in text
     assert "Approach" not in text
     first = {path.name: path.read_bytes() for path in out.iterdir()}
-    told = json.loads(truearm(*words, "--json").out)["program"]
-    assert (told["speed_mm_s"], told["joint_speed_percent"], told["dwell_s"]) == (pytest.approx(100.0), 5.0, 1.5)
+    program_summary = json.loads(truearm(*words, "--json").out)["program"]
+    assert (program_summary["speed_mm_s"], program_summary["joint_speed_percent"], program_summary["dwell_s"]) == (
+        pytest.approx(100.0),
+        5.0,
+        1.5,
+    )
     again = {path.name: path.read_bytes() for path in out.iterdir()}
     assert again["MEASURE.mod"] == first["MEASURE.mod"]
     assert again["plan.csv"] == first["plan.csv"]

@@ -60,7 +60,7 @@ def test_limits_in_another_unit_are_warned_of(tmp_path: Path) -> None:
     planned = truearm.plan(
         "irb120", poses=10, candidates=60, constraints=rules, model="offsets", out=tmp_path / "p.csv"
     )
-    (notice,) = [one for one in planned.warnings if one.code != "tool-assumed"]
+    (notice,) = [warning for warning in planned.warnings if warning.code != "tool-assumed"]
     assert (notice.code, notice.level) == ("limits-tiny", "warning")
     assert "joint 1 from -1.57 to 1.57 deg, joint 2 from -1 to 1 deg, joint 3" in notice.message
     prediction = planned.made.prediction
@@ -91,17 +91,17 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
         ({"out": tmp_path / "made.csv"}, "out", "this is a folder"),
         ({"accurate_at": poses, "out": poses}, "out", "this file is read, and would be overwritten"),
     ]
-    for given, parameter, words in cases:
+    for options, parameter, words in cases:
         with pytest.raises(InputError, match=words) as refusal:
-            truearm.plan("irb120", **{"poses": 10, "candidates": 60, **given})
+            truearm.plan("irb120", **{"poses": 10, "candidates": 60, **options})
         assert refusal.value.parameter == parameter
     assert poses.read_text() == POSES
 
 
 def test_a_plan_says_what_noise_it_assumes() -> None:
-    for noise, said in ((1e-4, "off by 0.100 mm"), (3e-5, "off by 0.0300 mm")):
+    for noise, words in ((1e-4, "off by 0.100 mm"), (3e-5, "off by 0.0300 mm")):
         planned = truearm.plan("irb120", poses=8, candidates=30, noise=noise, seed=3)
-        assert said in planned.answer[-1]
+        assert words in planned.answer[-1]
         assert "give `noise` where you know better" in planned.answer[-1]
         assert planned.answer[-1] in planned.lines()
 
@@ -130,12 +130,12 @@ def test_a_plan_for_a_program_for_poses_and_for_a_region(tmp_path: Path, nominal
         "at the given configurations": plan(accurate_at=np.zeros((1, 6))),
     }
     for words, planned in plans.items():
-        there = planned.made.prediction.there
-        assert there is not None
+        wanted = planned.made.prediction.there
+        assert wanted is not None
         assert f"12 of 60 usable configurations, chosen by the error {words}." in planned.lines()[:2]
-        assert planned.summary()["prediction"]["there"]["places"] == len(there.error)
-        assert there.by_o1 is not None
-        assert there.error.mean() < there.by_o1.mean()
+        assert planned.summary()["prediction"]["there"]["places"] == len(wanted.error)
+        assert wanted.by_o1 is not None
+        assert wanted.error.mean() < wanted.by_o1.mean()
         assert f"{words}, at most by" in planned.answer[0]
     assert len(plans["at the 11 of 15 targets of polish.mod"].joints) == 12
 
@@ -148,7 +148,7 @@ def test_of_many_places_some_are_looked_at() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("options", "words"),
     [
         ({"region": [(0.3, 0.3), (0, 1), (0, 1)]}, "no extent along x; got '300 to 300 mm'"),
         ({"region": [(3, 4), (0, 1), (0, 1)]}, "does not reach this region"),
@@ -162,9 +162,9 @@ def test_of_many_places_some_are_looked_at() -> None:
         ({"objective": "error"}, "nothing was said of where"),
     ],
 )
-def test_where_a_robot_shall_be_accurate_is_refused(given: dict[str, object], words: str) -> None:
+def test_where_a_robot_shall_be_accurate_is_refused(options: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        truearm.plan("irb120", **{"poses": 12, "candidates": 60, **given})  # type: ignore[arg-type]
+        truearm.plan("irb120", **{"poses": 12, "candidates": 60, **options})  # type: ignore[arg-type]
 
 
 def test_poses_and_targets_out_of_reach_are_refused(tmp_path: Path) -> None:
@@ -203,7 +203,7 @@ def test_another_plan_is_replaced_and_that_is_told(tmp_path: Path) -> None:
     assert (notice.code, notice.level) == ("plan-replaced", "warning")
     assert f"Another plan stood in {table}, written by 'truearm plan again', and was replaced." in notice.message
     assert any("plan-replaced" in line for line in other.lines())
-    assert [one["code"] for one in other.summary()["warnings"]] == ["plan-replaced", "tool-assumed"]
+    assert [warning["code"] for warning in other.summary()["warnings"]] == ["plan-replaced", "tool-assumed"]
     table.write_text(table.read_text() + "11,0,0,0,0,0,0\n")
     before = table.read_bytes()
     with pytest.raises(InputError, match="written here by truearm and has been changed since") as refusal:
@@ -253,13 +253,13 @@ def test_plans_of_tests_and_of_inclinometers_and_sets_of_poses_keep_to_the_same(
     cube.write_text("truearm: truearm-cube/1\nunits: {length: mm}\ncentre: [350, 0, 350]\nside: 200\n")
     tests: dict[str, Any] = {"cube": cube, "criteria": ["ap"], "out": tmp_path / "iso"}
     truearm.iso9283_plan("irb120", **tests)
-    assert "plan-replaced" not in {one.code for one in truearm.iso9283_plan("irb120", **tests).warnings}
+    assert "plan-replaced" not in {warning.code for warning in truearm.iso9283_plan("irb120", **tests).warnings}
     other = truearm.iso9283_plan("irb120", **tests, limit_band=0.2e-3)
     assert other.warnings[-1].code == "plan-replaced"
     tilts: dict[str, Any] = {"poses": 8, "candidates": 60, "pull": 20.0}
     truearm.plan_inclinometers("katana450", **tilts, out=tmp_path / "tilts.csv")
     table = truearm.plan_inclinometers("katana450", **tilts, seed=1, out=tmp_path / "tilts.csv")
-    assert [one["code"] for one in table.summary()["warnings"]] == ["plan-replaced"]
+    assert [warning["code"] for warning in table.summary()["warnings"]] == ["plan-replaced"]
     poses: dict[str, Any] = {"set": "iso-cube", "centre": (0.35, 0, 0.35), "side": 0.2}
     truearm.poses("irb120", **poses, out=tmp_path / "set.csv")
     truearm.poses("irb120", **poses, out=tmp_path / "set.csv")

@@ -39,7 +39,7 @@ def toured(name: str, approach: bool) -> tuple[Robot, Tour]:
 
 
 @cache
-def made(name: str, driving: Driving | None = None, *, approach: bool = True) -> tuple[Robot, Tour, MotionProgram]:
+def driven_by(name: str, driving: Driving | None = None, *, approach: bool = True) -> tuple[Robot, Tour, MotionProgram]:
     robot, tour = toured(name, approach)
     driving = driving or Driving(wait="input", input="3")
     return robot, tour, plan_program(tour, robot, BY_NAME[name].name, driving, "0123456789ab")[0]
@@ -59,18 +59,18 @@ def read_again(name: str, program: MotionProgram) -> Program:
     return BY_NAME[name].read(sources)
 
 
-def commanded(found: Program, count: int) -> Array:
+def commanded(program: Program, count: int) -> Array:
     """Return the joint positions of all moves as the controller takes them ``(moves, count)`` [rad or m]."""
-    targets = [found.targets[move.target] for move in found.moves]
+    targets = [program.targets[move.target] for move in program.moves]
     assert {target.form.kind for target in targets} == {"joints"}
     return np.array([target.values[:count] for target in targets]) * targets[0].form.angle
 
 
-def visited(found: Program) -> list[str]:
+def visited(program: Program) -> list[str]:
     """Return the comment above each move."""
     called = []
-    for move in found.moves:
-        lines = found.sources[move.source].text.splitlines()[: move.line - 1]
+    for move in program.moves:
+        lines = program.sources[move.source].text.splitlines()[: move.line - 1]
         called.append(
             next(m[1] for line in reversed(lines) if (m := re.search(r"(Measure \S+|Home|On the way|Approach)", line)))
         )
@@ -82,15 +82,15 @@ def test_the_own_reader_finds_the_planned_joint_positions_under_their_labels(nam
     digit = 0.5e-6 if name == "urscript" else np.radians(0.5e-4)
     expected = {"home": "Home", "via": "On the way", "approach": "Approach"}
     for wait in WAITS:
-        robot, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
-        found = read_again(name, program)
-        assert found.skipped == ()
-        assert not found.unknown
-        assert {move.kind for move in found.moves} == {"joint"}
-        at = commanded(found, len(robot.joints))
+        robot, tour, program = driven_by(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
+        read = read_again(name, program)
+        assert read.skipped == ()
+        assert not read.unknown
+        assert {move.kind for move in read.moves} == {"joint"}
+        at = commanded(read, len(robot.joints))
         assert np.abs(at - robot.controller.from_model(tour.joints)).max() <= digit * (1 + 1e-9), wait
         assert np.abs(robot.controller.to_model(at) - tour.joints).max() <= 2.1 * digit, wait  # one may count another
-        assert visited(found) == [expected.get(stop.kind, f"Measure {stop.label}") for stop in tour.stops], wait
+        assert visited(read) == [expected.get(stop.kind, f"Measure {stop.label}") for stop in tour.stops], wait
 
 
 @pytest.mark.parametrize("name", BY_NAME)
@@ -98,7 +98,7 @@ def test_no_output_is_set_and_no_mode_changed(name: str) -> None:
     outputs = r"\bSetDO\b|\bSet\s|\bReset\s|\bPulse|\$OUT|\bDO\[|\bRO\[|\bDOUT\b|_out|dioSet"
     modes = r"ConfL|CirPathMode|VelSet|AccSet|\$OV_PRO|OVERRIDE|SPEED_SLIDER|setMonitorSpeed|workingMode"
     for wait in WAITS:
-        text = text_of(name, made(name, Driving(wait=wait, input="3"))[2])  # type: ignore[arg-type]
+        text = text_of(name, driven_by(name, Driving(wait=wait, input="3"))[2])  # type: ignore[arg-type]
         assert re.findall(outputs, text) == re.findall(modes, text) == [], wait
 
 
@@ -188,7 +188,7 @@ endIf""",
 def test_the_robot_stops_stands_and_waits_in_every_configuration(name: str) -> None:
     stands, operator = STANDS[name]
     for wait in WAITS:
-        _, tour, program = made(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
+        _, tour, program = driven_by(name, Driving(wait=wait, input="3"))  # type: ignore[arg-type]
         text = text_of(name, program)
         plain = re.sub(r"^ *(\d+:)? *", "", text, flags=re.M)
         count = len(tour.measured)
@@ -198,7 +198,7 @@ def test_the_robot_stops_stands_and_waits_in_every_configuration(name: str) -> N
         assert len(re.findall(operator, text)) == (count if wait == "operator" else 0)
         assert plain.count(INPUTS[name]) == (1 if wait == "input" else 0)
         assert text.count("no signal") == (INPUTS[name].count("no signal") * count if wait == "input" else 0)
-    assert ("BasicIO-1\\%I3" in text_of(name, made(name)[2])) == (name == "val3")
+    assert ("BasicIO-1\\%I3" in text_of(name, driven_by(name)[2])) == (name == "val3")
 
 
 @pytest.mark.parametrize("name", ["fanuc-ls", "inform"])
@@ -214,7 +214,7 @@ def test_comments_are_no_longer_than_controllers_take_them(name: str) -> None:
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_the_head_says_what_the_program_is(name: str) -> None:
-    robot, _, program = made(name)
+    robot, _, program = driven_by(name)
     text = text_of(name, program)
     own = {
         "krl": ("of the joints' deg/s:", "154 154 228 343 384 721"),
@@ -225,7 +225,7 @@ def test_the_head_says_what_the_program_is(name: str) -> None:
     for words in (f"Robot {robot.name}", *head, *own, *warned):
         assert len(words) <= 32
         assert words in text
-    assert text == text_of(name, made(name)[2])
+    assert text == text_of(name, driven_by(name)[2])
 
 
 def test_the_controller_is_told_of_the_tool_in_its_own_axes() -> None:
@@ -240,20 +240,20 @@ def test_the_controller_is_told_of_the_tool_in_its_own_axes() -> None:
         "inform": "'Tool file 0 must hold this load",
         "val3": "// The controller must hold this load",
     }.items():
-        given = load_robot(ROBOTS[name])
-        given = given.with_frames(given.base, {"near": (0.0, 0.0, 0.02), "far": (0.03, 0.02, 0.1)})
-        given = replace(
-            given, controller=replace(given.controller, flange=turned), payload=Payload(1.5, (0.001, 0.002, 0.04))
+        stated = load_robot(ROBOTS[name])
+        stated = stated.with_frames(stated.base, {"near": (0.0, 0.0, 0.02), "far": (0.03, 0.02, 0.1)})
+        stated = replace(
+            stated, controller=replace(stated.controller, flange=turned), payload=Payload(1.5, (0.001, 0.002, 0.04))
         )
-        robot, tour = a_tour(given)
+        robot, tour = a_tour(stated)
         program, _ = plan_program(tour, robot, BY_NAME[name].name, Driving(), "abc")
         text = text_of(name, program)
         assert words in text
         assert "Tip: target far at" in text
         assert "Load 1.5 kg at" in text
-        found = read_again(name, program)
+        read = read_again(name, program)
         if name in ("rapid", "urscript"):
-            (load,) = found.loads.values()
+            (load,) = read.loads.values()
             assert load.mass == 1.5
             assert load.cog == pytest.approx((0.002, -0.001, 0.03))
 
@@ -280,9 +280,9 @@ def durations(name: str, text: str, shown: Array, rates: Array) -> list[float]:
         "val3": r"mJoint\.vel=([\d.]+)|movej",
     }
     shares, last = [], 0.0
-    for found in re.finditer(pattern[name], text):
-        last = float(found[1]) / 100 if found[1] else last
-        if not found[1] or name in ("fanuc-ls", "inform"):
+    for match in re.finditer(pattern[name], text):
+        last = float(match[1]) / 100 if match[1] else last
+        if not match[1] or name in ("fanuc-ls", "inform"):
             shares.append(last)
     return [float((way / rates).max()) / share for way, share in zip(turned, shares[1:], strict=True)]
 
@@ -309,7 +309,7 @@ def fastest_ways(name: str) -> Array:
     ways = tour.joints[:-1] + np.linspace(0.0, 1.0, 400)[:, None, None] * np.diff(tour.joints, axis=0)
     places = [
         robot.forward(ways.reshape(-1, ways.shape[-1]), target=target)[0].reshape(*ways.shape[:2], 3)
-        for target in (None, *(one.name for one in robot.targets))
+        for target in (None, *(target.name for target in robot.targets))
     ]
     return np.asarray(399.0 * np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=(0, 1)))
 
@@ -324,20 +324,20 @@ def with_speeds(robot: Robot, speeds: Sequence[float | None]) -> Robot:
 def test_neither_tip_nor_joints_are_faster_than_was_said(name: str, driving: Driving) -> None:
     tour = toured(name, approach=True)[1]
     for other in (False, True):
-        robot, program, told = driven(name, driving, other=other)
+        robot, program, said_speed = driven(name, driving, other=other)
         shown = robot.controller.from_model(tour.joints)
         slow, fast = joint_rates(robot)
         rates = np.full(len(slow), FASTEST) if name == "urscript" else fast
-        found = durations(name, text_of(name, program), shown, rates)
-        assert len(found) == len(tour.stops) - 1
-        fastest = float((fastest_ways(name) / found).max())
+        seconds = durations(name, text_of(name, program), shown, rates)
+        assert len(seconds) == len(tour.stops) - 1
+        fastest = float((fastest_ways(name) / seconds).max())
         shares = [step.share for step in program.steps if isinstance(step, JointMove)]
         assert max(shares) <= driving.share + 1e-12 or name == "urscript"
         assert min(shares) > 0.0
-        assert f"At most {1e3 * told:.4g}"[:10] in text_of(name, program)
-        assert told == driving.speed or name in ("krl", "fanuc-ls")
-        assert 0.05 * driving.speed < fastest <= (1.0 + 1e-5) * told, other
-        joints = np.abs(np.diff(shown, axis=0)) / np.array(found)[:, None]
+        assert f"At most {1e3 * said_speed:.4g}"[:10] in text_of(name, program)
+        assert said_speed == driving.speed or name in ("krl", "fanuc-ls")
+        assert 0.05 * driving.speed < fastest <= (1.0 + 1e-5) * said_speed, other
+        joints = np.abs(np.diff(shown, axis=0)) / np.array(seconds)[:, None]
         top = slow if name == "rapid" else rates if known_speeds(robot) is None else fast
         least = 0.01 if name in ("krl", "fanuc-ls") else 0.0  # the finest share that the language says
         assert (joints <= max(driving.share, least) * top * (1 + 1e-6)).all(), other
@@ -370,9 +370,9 @@ def test_shares_of_whole_percent_are_rounded_down() -> None:
 
 def test_a_first_move_that_may_be_faster_than_was_asked_is_counted() -> None:
     robot, tour = toured("fanuc-ls", approach=False)
-    slow, kept = first_shares(robot, "FANUC LS", 0.1, 0.25), first_shares(robot, "INFORM", 0.1, 0.05)
-    assert kept[0] == pytest.approx(np.floor(kept[0] * 1e4) * 1e-4)
-    assert kept[1] <= 0.05
+    slow, exact = first_shares(robot, "FANUC LS", 0.1, 0.25), first_shares(robot, "INFORM", 0.1, 0.05)
+    assert exact[0] == pytest.approx(np.floor(exact[0] * 1e4) * 1e-4)
+    assert exact[1] <= 0.05
     share, highest = first_shares(robot, "FANUC LS", 0.1, 0.05)
     assert share == slow[0] == 0.01
     assert highest > 0.05
@@ -383,8 +383,8 @@ def test_a_first_move_that_may_be_faster_than_was_asked_is_counted() -> None:
         moved = robot.controller.to_model(robot.controller.from_model(q) + 1e-4 * rates * [1, 1, sign, 1, sign, 1])
         steps = robot.forward(moved, target="1")[0] - robot.forward(q, target="1")[0]
         assert np.linalg.norm(steps, axis=1).max() / 1e-4 <= highest
-    _, told = plan_program(tour, robot, "FANUC LS", Driving(speed=0.05), "abc")
-    assert told >= highest
+    _, said_speed = plan_program(tour, robot, "FANUC LS", Driving(speed=0.05), "abc")
+    assert said_speed >= highest
 
 
 def test_where_the_speeds_of_joints_are_known_programs_are_faster_and_keep_to_them() -> None:
@@ -439,8 +439,8 @@ def test_velocities_of_a_urdf_are_not_relied_on() -> None:
     urdf = replace(robot, convention_name="urdf")
     assert known_speeds(urdf) is None
     without = with_speeds(robot, [None] * 6)
-    for one, other in zip(joint_rates(urdf), joint_rates(without), strict=True):
-        assert one == pytest.approx(other)
+    for rate, other in zip(joint_rates(urdf), joint_rates(without), strict=True):
+        assert rate == pytest.approx(other)
     assert speed_notices(robot, "") == []
     (notice,) = speed_notices(urdf, "this was taken")
     assert (notice.code, notice.level) == ("joint-speed-assumed", "note")
@@ -460,14 +460,14 @@ def test_a_language_of_whole_percent_says_how_fast_that_is() -> None:
     assert {step.share for step in program.steps if isinstance(step, JointMove)} == {0.01}
     assert 0.05 < fastest < 0.3
     assert f"At most {shown_speed(fastest)} mm/s" in text_of("krl", program)
-    finer, kept = plan_program(tour, robot, "INFORM", Driving(speed=0.02), "abc")
-    assert kept == 0.02
+    finer, exact = plan_program(tour, robot, "INFORM", Driving(speed=0.02), "abc")
+    assert exact == 0.02
     assert "VJ=0." in text_of("inform", finer)
 
 
 def test_the_first_move_is_slow_wherever_it_begins() -> None:
     for name in BY_NAME:
-        _, _, program = made(name)
+        _, _, program = driven_by(name)
         first, *others = (step for step in program.steps if isinstance(step, JointMove))
         assert first.seconds is None
         assert first.share <= min(step.share for step in others) + 1e-12 or name == "urscript"
@@ -479,18 +479,18 @@ def test_the_twin_driven_by_the_program_stands_in_all_configurations_in_order() 
     assert planned.program is not None
     assert planned.tour is not None
     robot, tour = planned.made.robot, planned.tour
-    found = BY_NAME["rapid"].read([Source(Path(file), text) for file, text in planned.program.files.items()])
-    text = found.sources[0].text
+    program = BY_NAME["rapid"].read([Source(Path(file), text) for file, text in planned.program.files.items()])
+    text = program.sources[0].text
     times = [float(v) for v in re.findall(r"\\T:=([\d.]+)", text)]
-    went = robot.controller.to_model(commanded(found, 6))
+    went = robot.controller.to_model(commanded(program, 6))
     step = 4e-3
-    pieces, ends, now = [went[:1]], [], 1
+    pieces, ends, row = [went[:1]], [], 1
     for start, end, seconds in zip(went[:-1], went[1:], times, strict=True):
         moved = joint_move(start, end, np.abs(end - start).max() / (seconds - 0.5), DRIVES.acceleration, step)
         stood = np.repeat(end[None], round(1.0 / step), axis=0)
         pieces += [moved, stood]
-        now += len(moved) + len(stood)
-        ends.append(now - 1)
+        row += len(moved) + len(stood)
+        ends.append(row - 1)
     command = np.concatenate(pieces)
     position, velocity = DRIVES.servo.follow(command, step)
     labels = {stop.label: stop.joints for stop in tour.measured}

@@ -57,9 +57,9 @@ def rules(**entries: object) -> Constraints:
     return Constraints.model_validate({"truearm": "truearm-constraints/1", **UNITS, **entries})
 
 
-def toured(**given: Any) -> tuple[Plan, Tour]:
+def toured(**options: Any) -> tuple[Plan, Tour]:
     """Plan for an IRB 120, and return its tour, too."""
-    planned = truearm.plan("irb120", **{"poses": 10, "candidates": 60, **given})
+    planned = truearm.plan("irb120", **{"poses": 10, "candidates": 60, **options})
     assert planned.tour is not None
     return planned, planned.tour
 
@@ -86,9 +86,9 @@ def test_thirty_poses_are_driven(name: str) -> None:
     low, high = window(robot).T
     assert ((tour.joints >= low - 1e-9) & (tour.joints <= high + 1e-9)).all()
     assert robot.forward(planned.joints)[0][:, 2].min() > 0.05
-    room = sampled_room(robot, on_the_ways(planned), Cell(), points=7)
-    assert room.min() >= 0.05
-    assert 0.05 <= tour.room <= sampled_room(robot, tour.joints, Cell()).min() + 1e-5
+    distances = sampled_room(robot, on_the_ways(planned), Cell(), points=7)
+    assert distances.min() >= 0.05
+    assert 0.05 <= tour.distance <= sampled_room(robot, tour.joints, Cell()).min() + 1e-5
 
 
 @pytest.mark.parametrize("name", ["irb120", "ur5e", "fr3"])
@@ -100,25 +100,26 @@ def test_limits_of_a_quarter_leave_as_many_to_choose_from(name: str) -> None:
     assert not any(planned.made.rejected.values())
     assert planned.tour is not None
     for number, (low, high) in quarter.limits.items():
-        there = np.rad2deg(planned.tour.joints[:, number - 1])
-        assert ((there >= low - 1e-9) & (there <= high + 1e-9)).all()
+        degrees = np.rad2deg(planned.tour.joints[:, number - 1])
+        assert ((degrees >= low - 1e-9) & (degrees <= high + 1e-9)).all()
 
 
 def test_boxes_of_the_cell_are_kept_out_of() -> None:
-    free, kept = (
-        truearm.plan("irb120", poses=20, candidates=150, constraints=one) for one in (None, rules(keep_out=TABLE))
+    free, restricted = (
+        truearm.plan("irb120", poses=20, candidates=150, constraints=constraints)
+        for constraints in (None, rules(keep_out=TABLE))
     )
     low, high = 1e-3 * np.array([TABLE["table"][axis] for axis in "xyz"]).T
     cell = Cell(boxes=boxes_of({"table": (low, high)}))
     assert sampled_room(free.made.robot, on_the_ways(free), cell, points=9).min() < 0.05
-    assert sampled_room(kept.made.robot, on_the_ways(kept), cell, points=9).min() >= 0.05
+    assert sampled_room(restricted.made.robot, on_the_ways(restricted), cell, points=9).min() >= 0.05
 
 
 def test_the_floor_is_the_base_unless_one_is_given_or_there_is_none() -> None:
     low, tour = toured(poses=20, candidates=150, floor=-0.4, clearance=0.1)
     assert (tour.floor, tour.clearance) == (-0.4, 0.1)
-    room = sampled_room(low.made.robot, on_the_ways(low), Cell(-0.4, clearance=0.1), points=9)
-    assert room.min() >= 0.1
+    distances = sampled_room(low.made.robot, on_the_ways(low), Cell(-0.4, clearance=0.1), points=9)
+    assert distances.min() >= 0.1
     assert low.made.robot.forward(low.joints)[0][:, 2].min() < 0.0
     assert " mm from the floor at -400 mm" in low.lines()[3]
     for of_file, floor in ((-300.0, -0.3), (80.0, 0.0)):
@@ -157,17 +158,17 @@ def test_a_safe_configuration_that_is_given_is_driven_from() -> None:
 
 def test_given_configurations_are_checked_where_room_or_boxes_are_asked_for() -> None:
     _, data = campaign("irb120", 40, 0.05e-3, 1)
-    given: dict[str, Any] = {"poses": 12, "candidates_from": data}
-    for plain in (truearm.plan("irb120", **given), truearm.plan("irb120", **given, constraints=rules())):
+    options: dict[str, Any] = {"poses": 12, "candidates_from": data}
+    for plain in (truearm.plan("irb120", **options), truearm.plan("irb120", **options, constraints=rules())):
         assert plain.tour is None
         assert plain.made.usable == 40
         assert "ways" not in plain.summary()
-    driven, _ = toured(**given, clearance=0.05)
+    driven, _ = toured(**options, clearance=0.05)
     assert driven.made.usable < 40
     assert driven.made.rejected["floor"] > 0
     below = driven.made.robot.forward(data.joints)[0][:, 2] < 0.0
     assert not set(np.array(data.labels)[below]) & set(driven.labels)
-    boxed, tour = toured(**given, constraints=rules(keep_out=TABLE))
+    boxed, tour = toured(**options, constraints=rules(keep_out=TABLE))
     assert boxed.made.rejected["keep_out table"] > 0
     assert tour.distances["keep_out table"] >= 0.05
 
@@ -190,34 +191,34 @@ def test_given_configurations_are_checked_where_that_is_asked_for() -> None:
 def test_a_pendant_with_another_base_frame_is_told_of(name: str, height: float | None) -> None:
     robot = truearm.load_robot(name)
     cell = Cell(boxes=boxes_of({"table": (np.array([0.4, -0.2, 0.0]), np.array([0.6, 0.2, 0.1]))}))
-    found = [one for one in cell_notices(CollisionCheck(robot, cell)) if one.code == "other-base-on-pendant"]
-    assert len(found) == (height is not None)
+    notices = [notice for notice in cell_notices(CollisionCheck(robot, cell)) if notice.code == "other-base-on-pendant"]
+    assert len(notices) == (height is not None)
     if height is not None:
-        assert found[0].level == "note"
-        assert found[0].message.startswith("The floor and boxes are kept in the base frame of the robot file.")
-        assert f"its origin at (0, 0, {height}) mm in it: add that" in found[0].message
+        assert notices[0].level == "note"
+        assert notices[0].message.startswith("The floor and boxes are kept in the base frame of the robot file.")
+        assert f"its origin at (0, 0, {height}) mm in it: add that" in notices[0].message
         turned = Transform.from_matrix(np.diag([-1.0, -1.0, 1.0]), np.array([0.0, 0.0, 0.33]))
         robot = replace(robot, controller=replace(robot.controller, base=turned))
-        (told,) = [n for n in cell_notices(CollisionCheck(robot, cell)) if n.code == "other-base-on-pendant"]
-        assert "in it, turned by 180 deg: add" in told.message
+        (turned_notice,) = [n for n in cell_notices(CollisionCheck(robot, cell)) if n.code == "other-base-on-pendant"]
+        assert "in it, turned by 180 deg: add" in turned_notice.message
         assert any(n.message.startswith("The floor is kept in") for n in cell_notices(CollisionCheck(robot, Cell())))
         nothing = CollisionCheck(robot, Cell(None))
         assert not [n for n in cell_notices(nothing) if n.code == "other-base-on-pendant"]
 
 
 def test_a_plan_without_a_program_says_what_it_assumed_of_the_tool() -> None:
-    def quick(robot: str | Robot, **given: Any) -> Plan:
-        return truearm.plan(robot, **{"poses": 10, "candidates": 30, "no_floor": True, "clearance": 0.0, **given})
+    def quick(robot: str | Robot, **options: Any) -> Plan:
+        return truearm.plan(robot, **{"poses": 10, "candidates": 30, "no_floor": True, "clearance": 0.0, **options})
 
     plain = quick("irb120")
-    assert [(one.code, one.level) for one in plain.warnings] == [("tool-assumed", "note")]
+    assert [(warning.code, warning.level) for warning in plain.warnings] == [("tool-assumed", "note")]
     assert "target 3 at (150, 0, 125) mm (the first tool of the robot file, triangular)" in plain.warnings[0].message
     assert "Note (tool-assumed): Nobody said the targets of the flange" in "\n".join(plain.lines())
     assert plain.summary()["warnings"][0]["code"] == "tool-assumed"
     robot = plain.made.robot
     assert quick(robot, payload="1kg,0mm,0mm,60mm").warnings == ()
     heavy = quick(robot, payload="9kg,0mm,0mm,60mm")
-    assert [(one.code, one.level) for one in heavy.warnings] == [("overload", "warning")]
+    assert [(warning.code, warning.level) for warning in heavy.warnings] == [("overload", "warning")]
     (notice,) = quick(replace(robot, rated_load=None), payload="9kg,0mm,0mm,60mm").warnings
     assert (notice.code, notice.level) == ("rating-unknown", "note")
     assert "The flange carries 9 kg, and the robot file does not say for how much irb120 is rated" in notice.message
@@ -230,8 +231,8 @@ def test_configurations_without_a_way_are_left_out_and_counted() -> None:
     wall = {"front": {"x": [80, 5000], "y": [-20, 20]}, "rear": {"x": [-5000, -80], "y": [-20, 20]}}
     _, data = campaign("irb120", 200, 0.05e-3, 1)
     home = np.deg2rad([90.0, 60, -30, 0, 0, 0]).tolist()
-    given: dict[str, Any] = {"poses": 4, "candidates_from": data, "floor": -1.0, "clearance": 0.02}
-    planned, _ = toured(**given, constraints=rules(keep_out=wall), home=home)
+    options: dict[str, Any] = {"poses": 4, "candidates_from": data, "floor": -1.0, "clearance": 0.02}
+    planned, _ = toured(**options, constraints=rules(keep_out=wall), home=home)
     assert planned.made.rejected["ways"] > 0
     assert planned.made.candidates == 200
     assert planned.joints[:, :5] == pytest.approx(data.joints[planned.made.chosen, :5])
@@ -267,7 +268,7 @@ def test_a_device_that_winds_no_cable() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "parameter", "words"),
+    ("options", "parameter", "words"),
     [
         ({"floor": 0.1}, "floor", "the floor is above the base of the robot; got '100 mm'; allowed: 0 mm or less"),
         ({"floor": -0.1, "no_floor": True}, "floor, no_floor", "a floor is given and denied; got '-100 mm'"),
@@ -280,9 +281,9 @@ def test_a_device_that_winds_no_cable() -> None:
         ({"home": [0.0, 1.5, 0, 0, 0, 0]}, "home", "the safe configuration is not clear"),
     ],
 )
-def test_what_cannot_be_driven_is_refused(given: dict[str, object], parameter: str, words: str) -> None:
+def test_what_cannot_be_driven_is_refused(options: dict[str, object], parameter: str, words: str) -> None:
     with pytest.raises(InputError, match=words) as refusal:
-        toured(**given)
+        toured(**options)
     assert refusal.value.parameter == parameter
 
 
@@ -342,12 +343,12 @@ def test_a_plan_is_as_good_as_one_that_hits_the_floor() -> None:
 def test_a_calibrated_robot_is_looked_at_where_its_table_says() -> None:
     robot = truearm.load_robot("irb120")
     moved = robot.with_values({"base_x": 0.5, "base_z": 0.7})
-    here, there = (truearm.plan(one, poses=12, candidates=60) for one in (robot, moved))
-    assert here.tour is not None
-    assert there.tour is not None
-    assert np.array_equal(here.tour.home, there.tour.home)
-    assert there.made.robot.forward(there.joints)[0][:, 2].min() > 0.05
-    assert replace(here.tour.stops[0], label=None).kind == "home"
+    nominal, calibrated = (truearm.plan(arm, poses=12, candidates=60) for arm in (robot, moved))
+    assert nominal.tour is not None
+    assert calibrated.tour is not None
+    assert np.array_equal(nominal.tour.home, calibrated.tour.home)
+    assert calibrated.made.robot.forward(calibrated.joints)[0][:, 2].min() > 0.05
+    assert replace(nominal.tour.stops[0], label=None).kind == "home"
 
 
 ODD = {
@@ -386,7 +387,7 @@ def test_arms_of_other_kinds_are_driven_where_nothing_is_near(kind: str, tmp_pat
 def test_a_plan_says_where_links_beside_their_lines_are_kept_clear() -> None:
     planned = truearm.plan("ur5e", poses=10, candidates=60)
     assert any("links-beside" in line for line in planned.lines())
-    assert [one["code"] for one in planned.summary()["warnings"]] == ["tool-assumed", "links-beside"]
+    assert [warning["code"] for warning in planned.summary()["warnings"]] == ["tool-assumed", "links-beside"]
 
 
 HOME = np.deg2rad([90.0, 60, -30, 0, 0, 0])
@@ -404,7 +405,7 @@ def walled() -> Reachable:
     check = CollisionCheck(robot, Cell(-1.0, boxes_of(walls), 0.02))
     low, high = np.array([joint.range for joint in robot.joints]).T
     drawn = np.random.default_rng(1).uniform(low, high, (400, 6))
-    clear = drawn[check.room(drawn) >= check.need]
+    clear = drawn[check.smallest_distance(drawn) >= check.need]
     return Reachable(WayFinder(check, HOME, low, high), clear, clear)
 
 
@@ -413,14 +414,14 @@ def test_what_has_no_way_is_left_out_and_the_choices_are_bounded(walled: Reachab
     finder, q = walled.finder, walled.joints
     far = np.argsort(finder.check.arm.robot.forward(q)[0][:, 1])  # beyond the wall first
     rounds: list[int] = []
-    said: list[str] = []
+    messages: list[str] = []
 
     def choose(left: np.ndarray) -> np.ndarray:
         rounds.append(len(left))
         return far[np.isin(far, left)][:3]
 
     reachable = Reachable(finder, q, q)
-    chosen, cost = chosen_with_ways(choose, np.arange(len(q)), reachable, 3, said.append)
+    chosen, cost = chosen_with_ways(choose, np.arange(len(q)), reachable, 3, messages.append)
     assert len(chosen) == 3
     assert len(rounds) == 4
     assert sorted(rounds, reverse=True) == rounds
@@ -429,8 +430,8 @@ def test_what_has_no_way_is_left_out_and_the_choices_are_bounded(walled: Reachab
     assert all(way is not None for way in finder.home_from(q[chosen]))
     assert cost["ways"] >= 9
     assert cost["ways"] + cost.get("straight ways", 0) + rounds[-1] == len(q)
-    assert [words for words in said if words.startswith("looking for ways that keep clear, round ")][-1][-1] == "3"
-    assert any(words.endswith("as there was no way to 3") for words in said)
+    assert [words for words in messages if words.startswith("looking for ways that keep clear, round ")][-1][-1] == "3"
+    assert any(words.endswith("as there was no way to 3") for words in messages)
 
 
 def test_too_few_with_ways_are_refused_with_what_is_in_the_way(walled: Reachable) -> None:

@@ -17,12 +17,12 @@ CUBE = Cube((0.35, 0.0, 0.35), 0.2)
 
 @pytest.mark.parametrize("name", [name for name in POSE_SETS if name != "118"])
 def test_the_joints_reach_every_pose_of_a_set(name: str) -> None:
-    made = pose_set(ROBOT, name, CUBE)
-    assert made.missed == ()
-    position, rotation = ROBOT.forward(made.joints)
-    assert position == pytest.approx(made.position, abs=1e-8)
-    assert rotation == pytest.approx(made.rotation, abs=1e-8)
-    assert len({*made.labels}) == len(made.labels) == len(made.joints)
+    poses = pose_set(ROBOT, name, CUBE)
+    assert poses.missed == ()
+    position, rotation = ROBOT.forward(poses.joints)
+    assert position == pytest.approx(poses.position, abs=1e-8)
+    assert rotation == pytest.approx(poses.rotation, abs=1e-8)
+    assert len({*poses.labels}) == len(poses.labels) == len(poses.joints)
 
 
 def test_where_the_poses_of_each_set_lie() -> None:
@@ -42,31 +42,31 @@ def test_where_the_poses_of_each_set_lie() -> None:
 
 
 def test_every_joint_moves_between_two_poses_of_the_large_set() -> None:
-    made = pose_set(ROBOT, "118", CUBE, count=30)
-    assert made.smallest_move >= np.radians(2.0)
-    assert sorted(int(label) for label in made.labels) == [*range(1, 31)]
-    position, _ = ROBOT.forward(made.joints)
-    assert position == pytest.approx(made.position, abs=1e-8)
+    poses = pose_set(ROBOT, "118", CUBE, count=30)
+    assert poses.smallest_move >= np.radians(2.0)
+    assert sorted(int(label) for label in poses.labels) == [*range(1, 31)]
+    position, _ = ROBOT.forward(poses.joints)
+    assert position == pytest.approx(poses.position, abs=1e-8)
     middle = np.array(
-        [CUBE.plane(name).normal @ (at - CUBE.centre) for name, at in zip(made.planes, position, strict=True)]
+        [CUBE.plane(name).normal @ (at - CUBE.centre) for name, at in zip(poses.planes, position, strict=True)]
     )
     assert middle == pytest.approx(0.0, abs=1e-8)
     again = pose_set(ROBOT, "118", CUBE, count=30)
-    assert again.joints == pytest.approx(made.joints, abs=0.0)
+    assert again.joints == pytest.approx(poses.joints, abs=0.0)
 
 
 def test_an_orientation_is_kept_and_what_it_costs_is_named() -> None:
-    made = pose_set(ROBOT, "iso-cube", Cube((0.35, 0.0, 0.35), 0.3), rotation=DOWN)
-    assert made.missed == ("C1", "C4")
-    assert np.abs(rotation_vector(made.rotation @ DOWN.T)).max() < 1e-8
-    assert "C1" not in made.labels
+    poses = pose_set(ROBOT, "iso-cube", Cube((0.35, 0.0, 0.35), 0.3), rotation=DOWN)
+    assert poses.missed == ("C1", "C4")
+    assert np.abs(rotation_vector(poses.rotation @ DOWN.T)).max() < 1e-8
+    assert "C1" not in poses.labels
 
 
 def test_a_large_set_leaves_out_what_is_not_reached() -> None:
-    made = pose_set(ROBOT, "118", Cube((0.35, 0.0, 0.4), 0.6), count=24)
-    assert made.missed
-    assert len(made.labels) + len(made.missed) == 24
-    assert made.smallest_move >= np.radians(2.0)
+    poses = pose_set(ROBOT, "118", Cube((0.35, 0.0, 0.4), 0.6), count=24)
+    assert poses.missed
+    assert len(poses.labels) + len(poses.missed) == 24
+    assert poses.smallest_move >= np.radians(2.0)
 
 
 def test_what_no_set_can_be_is_refused() -> None:

@@ -50,8 +50,8 @@ def test_a_set_is_written_as_other_commands_read_it(truearm: Truearm, tmp_path: 
 def test_a_target_of_the_robot_goes_to_the_poses(tmp_path: Path) -> None:
     robot = package.load_robot("irb120")
     robot = robot.with_frames(robot.base, {"a": (0.0, 0.02, 0.1), "b": (0.0, 0.0, 0.05)})
-    found = package.poses(robot, "p1-p5", centre=(0.35, 0.0, 0.3), side=0.2, target="a", out=tmp_path / "p.csv")
-    at, _ = robot.forward(found.joints, target="a")
+    poses = package.poses(robot, "p1-p5", centre=(0.35, 0.0, 0.3), side=0.2, target="a", out=tmp_path / "p.csv")
+    at, _ = robot.forward(poses.joints, target="a")
     assert at[0] == pytest.approx([0.35, 0.0, 0.3], abs=1e-8)
     assert read_poses(tmp_path / "p-poses.csv").position == pytest.approx(at, abs=1e-9)
     assert read_csv(tmp_path / "p.csv").targets == ("a", "b")
@@ -68,10 +68,10 @@ def test_unreachable_poses_end_with_exit_code_3_and_their_names(truearm: Truearm
 
 
 def test_the_controllers_joint_positions_can_be_asked_for(tmp_path: Path) -> None:
-    given = {"centre": (0.4, 0.0, 0.3), "side": 0.2}
-    fanuc = package.poses("lrmate200ic", "p1-p5", out=tmp_path / "c.csv", **given)  # type: ignore[arg-type]
+    cube = {"centre": (0.4, 0.0, 0.3), "side": 0.2}
+    fanuc = package.poses("lrmate200ic", "p1-p5", out=tmp_path / "c.csv", **cube)  # type: ignore[arg-type]
     assert "axis_1 [deg]" in (tmp_path / "c.csv").read_text().splitlines()[0]
-    package.poses("lrmate200ic", "p1-p5", joints="model", out=tmp_path / "m.csv", **given)  # type: ignore[arg-type]
+    package.poses("lrmate200ic", "p1-p5", joints="model", out=tmp_path / "m.csv", **cube)  # type: ignore[arg-type]
     assert read_csv(tmp_path / "m.csv").joints == pytest.approx(fanuc.joints, abs=1e-12)
     shown = package.load_data(tmp_path / "c.csv", "lrmate200ic")
     assert shown.joints == pytest.approx(fanuc.joints, abs=1e-9)
@@ -79,7 +79,7 @@ def test_the_controllers_joint_positions_can_be_asked_for(tmp_path: Path) -> Non
 
 def test_what_no_set_can_be_is_refused(tmp_path: Path) -> None:
     cube = {"centre": (0.3, 0, 0.3), "side": 0.2}
-    for parameter, given, said in (
+    for parameter, options, expected in (
         ("centre, side", {"set": "sphere"}, "the sphere needs its centre and its size"),
         ("centre, side", {"set": "p1-p5", "centre": (0.3, 0, 0.3)}, "a cube needs its centre and its side"),
         ("count", {"set": "p1-p5", **cube, "count": 5}, "has a number of poses of its own"),
@@ -91,7 +91,7 @@ def test_what_no_set_can_be_is_refused(tmp_path: Path) -> None:
         ("target", {"set": "p1-p5", "target": "a"}, "there is no target"),
         (None, {"set": "p1-p5", "lowest": 5.0}, "reaches no cube"),
     ):
-        refused(parameter, said, package.poses, "irb120", **given)
+        refused(parameter, expected, package.poses, "irb120", **options)
     package.poses("irb120", "p1-p5", centre=(0.35, 0.0, 0.35), side=0.2, out=tmp_path / "p.csv")
     words = "a device finds its own configurations"
     asked = {"truth": "nominal", "poses": tmp_path / "p.csv", "device": "tracker"}

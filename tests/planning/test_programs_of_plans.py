@@ -14,7 +14,7 @@ from tests.simulated import campaign
 import truearm
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.manifest import MANIFEST, hash_of
-from truearm.engine.document.document import held_by
+from truearm.engine.document.document import json_of
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.devices import named_device
@@ -40,8 +40,8 @@ def planned(folder: Path) -> Plan:
     )
 
 
-def wanted(**given: Any) -> Any:
-    asked = PlanPoses("irb120", poses=8, **{"program": "rapid", **given})
+def wanted(**options: Any) -> Any:
+    asked = PlanPoses("irb120", poses=8, **{"program": "rapid", **options})
     return program_wanted(asked.program, approach=asked.approach, speed=asked.speed, dwell=asked.dwell, wait=asked.wait)
 
 
@@ -68,12 +68,12 @@ def test_a_plan_tells_of_its_program(planned: Plan) -> None:
     assert f"At most 250 mm/s and 10 % of the joints' speed ({speeds}); it stands for 2 s, then until" in lines
     assert "It tells the controller of target 2 at (75, 93.7, 215) mm and of 1.5 kg at (0, 0, 60) mm." in lines
     assert "It is not verified and no safety function" in lines
-    told = planned.summary()["program"]
+    summary = planned.summary()["program"]
     expected = {"language": "RAPID", "files": ["MEASURE.mod"], "order": list(planned.labels), "approached": True}
     expected |= {"speed_mm_s": 250.0, "joint_speed_percent": 10.0, "dwell_s": 2.0, "joint_speeds": speeds}
-    assert told == told | expected | {"wait": "operator", "tip": "2", "load_kg": 1.5}
-    assert [notice["code"] for notice in told["warnings"]] == ["tool-assumed"]
-    assumed = told["warnings"][0]["message"]
+    assert summary == summary | expected | {"wait": "operator", "tip": "2", "load_kg": 1.5}
+    assert [notice["code"] for notice in summary["warnings"]] == ["tool-assumed"]
+    assumed = summary["warnings"][0]["message"]
     assert "Nobody said the targets of the flange" in assumed
     assert "target 2 at (75, 93.7, 215) mm, target 3 at (150, 0, 125) mm (the first tool of the robot" in assumed
     assert "kg" not in assumed
@@ -113,7 +113,7 @@ def test_a_plan_without_a_program_stays_a_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "parameter", "message"),
+    ("options", "parameter", "message"),
     [
         ({"program": None, "approach": True}, "approach", "none is asked for"),
         ({"program": None, "speed": (0.1,)}, "speed", "none is asked for"),
@@ -143,9 +143,9 @@ def test_a_plan_without_a_program_stays_a_file(tmp_path: Path) -> None:
         ({"program": "krl", "wait": "input 99999"}, "wait", "has no such digital input"),
     ],
 )
-def test_what_cannot_be_driven_is_refused(given: dict[str, Any], parameter: str, message: str) -> None:
+def test_what_cannot_be_driven_is_refused(options: dict[str, Any], parameter: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as refusal:
-        wanted(**given)
+        wanted(**options)
     assert refusal.value.parameter == parameter
 
 
@@ -169,14 +169,14 @@ def test_a_speed_below_the_lowest_share_of_a_language_is_told(planned: Plan) -> 
         ("krl", known, ["faster-than-asked"]),
         ("val3", unknown, ["joint-speed-assumed"]),
     ):
-        made = replace(planned, made=replace(planned.made, robot=robot))
-        slow = with_program(made, wanted(program=program, speed=(0.01,)), robot, weighed=True).program
+        changed = replace(planned, made=replace(planned.made, robot=robot))
+        slow = with_program(changed, wanted(program=program, speed=(0.01,)), robot, weighed=True).program
         assert slow is not None
         assert [notice.code for notice in slow.warnings] == codes
         assert bool(slow.speeds) == (robot is known)
         assert ("as fast as any" in slow.warnings[0].message) == (program == "krl" and robot is unknown)
         assert (slow.fastest > 0.011) == (program == "krl")
-        assert held_by(slow.blocks())["speed_mm_s"] == 1e3 * slow.fastest
+        assert json_of(slow.blocks())["speed_mm_s"] == 1e3 * slow.fastest
     assert "KRL says no share below 1 %" not in "\n".join(planned.lines())
 
 
@@ -203,7 +203,7 @@ def test_a_language_that_the_controller_does_not_speak_is_refused(
 def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> None:
     robot, tour = a_tour(replace(truearm.load_robot("puma560"), maker=""))
     tour = replace(tour, notices=(Notice("never-apart", "What the ways say is said of the program, too.", "note"),))
-    made = replace(
+    measured = replace(
         planned.made,
         robot=robot,
         joints=tour.joints[1:5],
@@ -218,7 +218,9 @@ def test_of_a_robot_without_a_maker_every_language_is_taken(planned: Plan) -> No
                 asked.check(robot)
             continue
         asked.check(robot)
-        driven = with_program(replace(planned, made=made, tour=tour, program=None), asked, robot, weighed=False).program
+        driven = with_program(
+            replace(planned, made=measured, tour=tour, program=None), asked, robot, weighed=False
+        ).program
         assert driven is not None
         notices = list(driven.warnings)
         if program == "krl":  # at 1 %, the first move of an arm as fast as any
@@ -298,18 +300,18 @@ def test_labels_that_no_comment_can_have_are_refused(label: str) -> None:
 
 
 def test_a_folder_of_another_result_or_a_file_is_no_place(planned: Plan, folder: Path, tmp_path: Path) -> None:
-    for out, mine, words in (
+    for out, name, words in (
         (tmp_path / "plan.csv", "", "a plan with a program needs a folder"),
         (tmp_path, "sheet.html", "was not written here by truearm"),
         (tmp_path, "MEASURE.mod", "was not written here by truearm"),
     ):
-        if mine:
-            (tmp_path / mine).write_text("mine")
+        if name:
+            (tmp_path / name).write_text("mine")
         with pytest.raises(InputError, match=words) as refusal:
             truearm.plan("irb120", **QUICK, program="rapid", out=out)
         assert refusal.value.parameter == "out"
-        assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(mine, "mine")] * bool(mine)
-        (tmp_path / (mine or "none")).unlink(missing_ok=True)
+        assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")] * bool(name)
+        (tmp_path / (name or "none")).unlink(missing_ok=True)
     # and programs of two plans never stand in one folder
     with pytest.raises(InputError, match=r"the program of another plan is there.*got 'MEASURE\.mod'") as refusal:
         refuse_other_programs(folder, ["MEASURE.src"])
@@ -319,9 +321,9 @@ def test_a_folder_of_another_result_or_a_file_is_no_place(planned: Plan, folder:
 
 def test_a_load_above_the_rated_one_is_warned_of() -> None:
     robot = replace(truearm.load_robot("irb120"), rated_load=3.0)
-    made = truearm.plan(robot, **QUICK, program="rapid", payload="9kg,0mm,0mm,60mm").program
-    assert made is not None
-    (notice,) = [one for one in made.warnings if one.code == "overload"]
+    written = truearm.plan(robot, **QUICK, program="rapid", payload="9kg,0mm,0mm,60mm").program
+    assert written is not None
+    (notice,) = [warning for warning in written.warnings if warning.code == "overload"]
     assert notice.level == "warning"
     assert "carries 9 kg" in notice.message
     assert "rated for 3 kg" in notice.message

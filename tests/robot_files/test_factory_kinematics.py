@@ -95,13 +95,13 @@ def test_a_plate_gets_better_when_the_controllers_own_kinematics_are_told(
     cell: Path, arm: ur.Arm, way: str, tmp_path: Path
 ) -> None:
     robot: truearm.Robot | str = "ur10"
-    said: Path | None = cell / "calibration.conf"
+    kinematics: Path | None = cell / "calibration.conf"
     if way == "imported robot":
-        robot, said = truearm.import_ur_kinematics(cell / "calibration.conf", "ur10").robot, None
+        robot, kinematics = truearm.import_ur_kinematics(cell / "calibration.conf", "ur10").robot, None
     elif way == "ROS driver's file":
-        made = truearm.import_ur_kinematics(cell / "calibration.conf", "ur10").robot
-        truearm.export(made, "ur-kinematics", out=tmp_path / "ros.yaml")
-        said = tmp_path / "ros.yaml"
+        arm_of_controller = truearm.import_ur_kinematics(cell / "calibration.conf", "ur10").robot
+        truearm.export(arm_of_controller, "ur-kinematics", out=tmp_path / "ros.yaml")
+        kinematics = tmp_path / "ros.yaml"
     calibration = truearm.calibrate(robot, cell / "data.csv", seed=3)
     calibrated: truearm.Robot | Path = calibration.robot
     if way == "robot file":
@@ -110,9 +110,9 @@ def test_a_plate_gets_better_when_the_controllers_own_kinematics_are_told(
         text = file.read_text()
         (tmp_path / "factory.conf").write_text(ur.UR10_CONF)
         file.write_text(text.replace("controller:\n", "controller:\n  kinematics: factory.conf\n"))
-        calibrated, said = file, None
+        calibrated, kinematics = file, None
     original = (cell / "plate.script").read_text()
-    corrected = compensate(calibrated, [cell / "plate.script"], controller_kinematics=said)
+    corrected = compensate(calibrated, [cell / "plate.script"], controller_kinematics=kinematics)
     assert not {"edited-by-hand", "controller-unknown"} & {notice.code for notice in corrected.warnings}
     before = plate_error(run(original, arm), wanted(original))
     after = plate_error(run(corrected.files[0].text.decode(), arm), wanted(original))

@@ -73,8 +73,8 @@ def test_a_seed_is_of_the_kind_that_is_written(truearm: Truearm, tmp_path: Path)
     robot, out = load_robot("lrmate200ic"), tmp_path / "j.csv"
     shown = np.array([10.0, 20.0, 30.0, 40.0, 50.0, -300.0])
     p, R = robot.forward(robot.controller.to_model(np.radians(shown[None])), frame="controller")
-    there = _written(tmp_path / "there.csv", p, quaternion_from_rotation(R))
-    words = ("ik", "lrmate200ic", there, "--frame", "controller", "--out", out, "--seed-joints")
+    poses_file = _written(tmp_path / "there.csv", p, quaternion_from_rotation(R))
+    words = ("ik", "lrmate200ic", poses_file, "--frame", "controller", "--out", out, "--seed-joints")
     run = truearm(*words, ",".join(map(str, shown)))
     assert "Joint positions in the file are those that the robot's controller shows (axis_i)." in run.out
     assert "model-frame" not in run.out

@@ -28,22 +28,22 @@ def test_arrays_and_a_file_give_the_same_joints(tmp_path: Path) -> None:
     file = tmp_path / "poses.csv"
     lines = [f"{n},{','.join(map(repr, row))}" for n, row in enumerate(rows, 1)]
     file.write_text("\n".join(["pose,x [mm],y [mm],z [mm],qw,qx,qy,qz", *lines]) + "\n")
-    found = truearm.inverse("irb120", p, R, seed_joints=Q)
-    assert found.joints == pytest.approx(Q, abs=1e-9)
-    assert found.complete
-    assert found.lines() == ["2 of 2 poses reached. Rows: 2 reached"]
+    table = truearm.inverse("irb120", p, R, seed_joints=Q)
+    assert table.joints == pytest.approx(Q, abs=1e-9)
+    assert table.complete
+    assert table.lines() == ["2 of 2 poses reached. Rows: 2 reached"]
     read = truearm.inverse("irb120", file, seed_joints=Q[0], branch="front-up-noflip", out=tmp_path / "joints.csv")
     assert read.joints == pytest.approx(Q, abs=1e-9)
     assert (tmp_path / "joints.csv").read_text().count("\n") == 3
 
 
 def test_every_pose_out_of_reach_is_told() -> None:
-    found = truearm.inverse("irb120", np.full((12, 3), 5.0), orientation="free")
-    assert not found.complete
-    assert len(found.attention) == 12
-    assert len(found.lines()) == 13
-    assert len(first_screen(found)) < 10
-    assert found.summary()["poses_reached"] == 0
+    table = truearm.inverse("irb120", np.full((12, 3), 5.0), orientation="free")
+    assert not table.complete
+    assert len(table.attention) == 12
+    assert len(table.lines()) == 13
+    assert len(first_screen(table)) < 10
+    assert table.summary()["poses_reached"] == 0
 
 
 def test_orientations_and_branches_that_cannot_be_are_refused(tmp_path: Path) -> None:
@@ -58,7 +58,7 @@ def test_orientations_and_branches_that_cannot_be_are_refused(tmp_path: Path) ->
         ((file,), {"orientation": "free", "out": file}, "out", "would be overwritten"),
         ((p,), {"orientation": "free", "branch": "all"}, "branch", "have no names for this robot or pose"),
     ]
-    for given, more, parameter, words in cases:
+    for arguments, more, parameter, words in cases:
         with pytest.raises(InputError, match=words) as refusal:
-            truearm.inverse("irb120", *given, **more)
+            truearm.inverse("irb120", *arguments, **more)
         assert refusal.value.parameter == parameter

@@ -24,29 +24,29 @@ from truearm.robot_files.formats import FORMATS
 
 def test_a_converted_robot_has_the_same_poses(tmp_path: Path) -> None:
     robot = truearm.load_robot("irb120")
-    made = truearm.convert(robot, "mcpc")
-    assert made.file is None
-    assert made.robot.convention_name == "mcpc"
-    assert repr(made).startswith("irb120, converted from modified-hayati to mcpc")
+    conversion = truearm.convert(robot, "mcpc")
+    assert conversion.file is None
+    assert conversion.robot.convention_name == "mcpc"
+    assert repr(conversion).startswith("irb120, converted from modified-hayati to mcpc")
     joints = np.radians([[10.0, 20.0, -30.0, 40.0, 50.0, 60.0]])
     np.testing.assert_allclose(
-        made.robot.forward_kinematics(joints).position, robot.forward_kinematics(joints).position
+        conversion.robot.forward_kinematics(joints).position, robot.forward_kinematics(joints).position
     )
     file = tmp_path / "new" / "mcpc.yaml"
     assert repr(truearm.convert(robot, "mcpc", out=file)).startswith(f"{file}: irb120, converted")
-    assert file.read_text() == robot_text(made.robot)
+    assert file.read_text() == robot_text(conversion.robot)
 
 
 def test_an_exported_robot_holds_its_text(tmp_path: Path) -> None:
-    made = truearm.export("irb120", "urdf")
-    assert made.text.startswith("<?xml")
-    assert made.summary()["file"] is None
-    assert repr(made).startswith("irb120 as urdf. Poses are those of the flange")
-    assert made.left_out
-    assert all(sentence in repr(made) for sentence in made.left_out)
+    export = truearm.export("irb120", "urdf")
+    assert export.text.startswith("<?xml")
+    assert export.summary()["file"] is None
+    assert repr(export).startswith("irb120 as urdf. Poses are those of the flange")
+    assert export.left_out
+    assert all(sentence in repr(export) for sentence in export.left_out)
     file = tmp_path / "irb120.urdf"
     assert truearm.export("irb120", "urdf", out=file).file == file
-    assert file.read_text() == made.text
+    assert file.read_text() == export.text
 
 
 def test_axes_that_a_table_cannot_hold_are_refused() -> None:
@@ -88,9 +88,9 @@ def test_a_session_can_be_followed(tmp_path: Path) -> None:
 
 
 def test_a_template_is_a_robot(tmp_path: Path) -> None:
-    made = truearm.new_robot(tmp_path / "mine.yaml")
-    assert repr(made) == f"{made.file}: fill it in, then look at it with 'truearm show {made.file}'."
-    assert len(truearm.load_robot(made.file).joints) == 6
+    template = truearm.new_robot(tmp_path / "mine.yaml")
+    assert repr(template) == f"{template.file}: fill it in, then look at it with 'truearm show {template.file}'."
+    assert len(truearm.load_robot(template.file).joints) == 6
 
 
 @pytest.fixture(scope="module")
@@ -208,43 +208,41 @@ def test_a_description_says_what_a_robot_is_and_carries() -> None:
     shown = truearm.show(loaded)
     assert "Payload: 1.5 kg at x 10  y 20  z 30 mm of the flange" in shown.lines()
     assert "Free fall: 0, -9.81, 0 m/s^2 in the base frame" in shown.lines()
-    told = shown.summary()
-    assert told["payload"] == {"mass_kg": 1.5, "cog_mm": [10.0, 20.0, 30.0]}
-    assert (told["masses_kg"], told["rated_load_kg"]) == ({"link 2": 4.2, "link 4": 5.0}, 3.0)
-    assert told["joints"][2]["limits"] == pytest.approx([-110.0, 70.0])
+    summary = shown.summary()
+    assert summary["payload"] == {"mass_kg": 1.5, "cog_mm": [10.0, 20.0, 30.0]}
+    assert (summary["masses_kg"], summary["rated_load_kg"]) == ({"link 2": 4.2, "link 4": 5.0}, 3.0)
+    assert summary["joints"][2]["limits"] == pytest.approx([-110.0, 70.0])
 
 
 def test_robots_are_found_by_maker_joints_and_words() -> None:
-    def found(**given: Any) -> list[dict[str, Any]]:
-        listed: list[dict[str, Any]] = truearm.robots(**given).summary()["robots"]
+    def listed_robots(**filters: Any) -> list[dict[str, Any]]:
+        listed: list[dict[str, Any]] = truearm.robots(**filters).summary()["robots"]
         return listed
 
-    everything = found()
+    everything = listed_robots()
     for maker, whole in (("abb", "ABB"), ("ur", "Universal Robots"), ("Robots", "Universal Robots")):
-        assert whole in {robot["maker"] for robot in found(maker=maker)}
-        assert len(found(maker=maker)) < len(everything)
-    assert {robot["maker"] for robot in found(maker="ur")} == {"Universal Robots"}
-    assert None not in {robot["maker"] for robot in found(maker="abb")}
-    assert {robot["joints"] for robot in found(axes=7)} == {7}
-    assert [robot["id"] for robot in found(text="gofa crb")] == ["crb15000_5_0.95"]
-    for given, words in (
+        assert whole in {robot["maker"] for robot in listed_robots(maker=maker)}
+        assert len(listed_robots(maker=maker)) < len(everything)
+    assert {robot["maker"] for robot in listed_robots(maker="ur")} == {"Universal Robots"}
+    assert None not in {robot["maker"] for robot in listed_robots(maker="abb")}
+    assert {robot["joints"] for robot in listed_robots(axes=7)} == {7}
+    assert [robot["id"] for robot in listed_robots(text="gofa crb")] == ["crb15000_5_0.95"]
+    for filters, words in (
         ({"maker": "abbb"}, "no robot of this maker; got 'abbb'"),
         ({"axes": 2}, "none of these robots has so many joints"),
         ({"text": "irb12O"}, "none of these robots is called so.*Did you mean irb120"),
     ):
         with pytest.raises(InputError, match=words):
-            found(**given)
+            listed_robots(**filters)
 
 
 def test_kinematics_of_a_controller_are_read_and_those_of_another_type_refused(tmp_path: Path) -> None:
     file, out = tmp_path / "calibration.conf", tmp_path / "arm.yaml"
     file.write_text(UR10_CONF)
-    made = truearm.import_ur_kinematics(file, "ur10", out=out)
-    words = (
-        f"ur10 with the kinematics of its controller, flange {1e3 * made.distance:.2f} mm from the type's on average"
-    )
-    assert made.lines()[0] == f"{out}: {words}"
-    assert made.summary()["mean_distance_from_type_mm"] == pytest.approx(1e3 * made.distance)
+    arm = truearm.import_ur_kinematics(file, "ur10", out=out)
+    words = f"ur10 with the kinematics of its controller, flange {1e3 * arm.distance:.2f} mm from the type's on average"
+    assert arm.lines()[0] == f"{out}: {words}"
+    assert arm.summary()["mean_distance_from_type_mm"] == pytest.approx(1e3 * arm.distance)
     again = truearm.import_ur_kinematics(file, "ur10")
     assert again.lines()[0] == words
     assert truearm.load_robot(out).values == pytest.approx(again.robot.values)

@@ -51,8 +51,8 @@ def test_angles_move_the_tip_by_the_chord_about_their_axis(q: Array, name: str, 
 
 def test_at_80_degrees_joint_4_has_more_influence_than_joint_3() -> None:
     """The example of section 3.6."""
-    found = influence(katana(), at(q4=80), NAMES, "tip", PERTURBATIONS)
-    size = dict(zip(found.names, found.size[:, 0], strict=True))
+    result = influence(katana(), at(q4=80), NAMES, "tip", PERTURBATIONS)
+    size = dict(zip(result.names, result.size[:, 0], strict=True))
     assert size["theta_offset_4"] > 4 * size["theta_offset_3"]
 
 
@@ -63,20 +63,20 @@ def test_in_a_cube_before_the_arm_the_averages_are_those_of_the_document() -> No
     """
     robot = katana()
     q = robot.random_configurations(60_000, np.random.default_rng(0))
-    kept = (np.abs(robot.world_poses(q, "tip")[0] - [0.0, 0.45, 0.0]) < 0.15).all(axis=1)
-    found = influence(robot, q[kept], NAMES, "tip", PERTURBATIONS)
-    mean = dict(zip(found.names, 1e3 * found.mean, strict=True))
-    assert kept.sum() > 118
+    inside = (np.abs(robot.world_poses(q, "tip")[0] - [0.0, 0.45, 0.0]) < 0.15).all(axis=1)
+    result = influence(robot, q[inside], NAMES, "tip", PERTURBATIONS)
+    mean = dict(zip(result.names, 1e3 * result.mean, strict=True))
+    assert inside.sum() > 118
     assert mean["theta_offset_2"] == pytest.approx(0.34, abs=0.02)
     assert mean["alpha_3"] / mean["theta_offset_2"] == pytest.approx(0.59, abs=0.04)
 
 
 def test_the_most_influential_parameter_depends_on_the_configuration() -> None:
-    found = influence(katana(), configurations(500), NAMES, "tip", PERTURBATIONS)
-    theta_2, theta_3 = found.size[1], found.size[2]
+    result = influence(katana(), configurations(500), NAMES, "tip", PERTURBATIONS)
+    theta_2, theta_3 = result.size[1], result.size[2]
     assert (theta_2 > theta_3).any()
     assert (theta_3 > theta_2).any()
-    assert found.greatest[2] > found.least[1]
+    assert result.greatest[2] > result.least[1]
 
 
 @pytest.mark.parametrize("robot", ["katana450", "irb120", "kr5"])
@@ -86,8 +86,8 @@ def test_influence_is_what_the_perturbed_twin_shows(robot: str) -> None:
     target = true.targets[0].name
     names = [n for n, p in true.parameters.items() if p.group in ("geometry", "joint zero", "target")]
     q = true.random_configurations(3, np.random.default_rng(3))
-    found = influence(true, q, names, target)
-    for row, name in zip(found.size, names, strict=True):
+    result = influence(true, q, names, target)
+    for row, name in zip(result.size, names, strict=True):
         step = {"rad": math.radians(0.05), "m": 1e-4}[true.parameters[name].unit]
         moved = Twin(true.with_values({name: true.values[name] + step}))
         apart = [moved.target_frames(r)[target] - Twin(true).target_frames(r)[target] for r in q]
@@ -104,25 +104,25 @@ def test_where_the_robot_stands_does_not_matter() -> None:
 
 def test_joint_effects_are_felt_and_can_be_perturbed() -> None:
     robot = katana().with_effects(["gain"])
-    found = influence(robot, at(q5=90), ["gain_5", "gain_1"], "tip", {"gain_5": 1e-3, "gain_1": 1e-3})
-    assert found.size[0, 0] == pytest.approx(2 * 0.2 * math.sin(1e-3 * math.pi / 4), rel=1e-9)
-    assert found.size[1, 0] == 0.0
+    result = influence(robot, at(q5=90), ["gain_5", "gain_1"], "tip", {"gain_5": 1e-3, "gain_1": 1e-3})
+    assert result.size[0, 0] == pytest.approx(2 * 0.2 * math.sin(1e-3 * math.pi / 4), rel=1e-9)
+    assert result.size[1, 0] == 0.0
 
 
 def test_the_influence_vector_is_relative_to_the_most_influential_of_each_configuration() -> None:
     size = np.array([[1.0, 4.0], [2.0, 1.0], [0.0, 2.0]])
-    found = Influence(("a", "b", "c"), np.ones(3), size)
-    np.testing.assert_array_equal(found.vector, [[0.5, 1.0], [1.0, 0.25], [0.0, 0.5]])
-    np.testing.assert_array_equal([found.mean, found.least, found.greatest], [[2.5, 1.5, 1], [1, 1, 0], [4, 2, 2]])
+    result = Influence(("a", "b", "c"), np.ones(3), size)
+    np.testing.assert_array_equal(result.vector, [[0.5, 1.0], [1.0, 0.25], [0.0, 0.5]])
+    np.testing.assert_array_equal([result.mean, result.least, result.greatest], [[2.5, 1.5, 1], [1, 1, 0], [4, 2, 2]])
 
 
 def test_no_influence_at_all_has_no_most_influential_parameter() -> None:
     robot = load_robot("katana450")
     on_axis_5 = robot.with_frames(robot.base, {"tip": (0.0, 0.0, -0.2)})
-    found = influence(on_axis_5, configurations(3), ["theta_offset_5"], "tip")
-    assert found.greatest[0] < 1e-15
+    result = influence(on_axis_5, configurations(3), ["theta_offset_5"], "tip")
+    assert result.greatest[0] < 1e-15
     with pytest.raises(InputError, match=r"configuration 1: none of the parameters moves the tip") as error:
-        _ = found.vector
+        _ = result.vector
     assert error.value.cure
 
 

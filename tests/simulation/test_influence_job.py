@@ -32,7 +32,7 @@ def measured() -> Dataset:
 
 
 @cache
-def found() -> InfluenceResult:
+def influence_result() -> InfluenceResult:
     return truearm.influence(KATANA, measured())
 
 
@@ -88,15 +88,19 @@ def test_what_moves_nothing_is_named() -> None:
 
 
 def test_identification_by_influence_stands_beside_the_standard_one() -> None:
-    result = found()
+    result = influence_result()
     assert result.identified is not None
     assert result.identified.held_out
-    errors = {way: one.position.mean for way, one in result.identified.errors.items() if one.position is not None}
+    errors = {
+        way: errors_of_way.position.mean
+        for way, errors_of_way in result.identified.errors.items()
+        if errors_of_way.position is not None
+    }
     assert list(errors) == ["nominal", "minimum norm", "influence", "least squares", "calibrate"]
     assert errors["calibrate"] < 0.2 * errors["influence"]
     assert errors["least squares"] < errors["influence"] < errors["nominal"]
     assert codes(result) == {"influence-worse": "note"}
-    rows = {row["name"]: row for row in result.found()}
+    rows = {row["name"]: row for row in result.parameter_rows()}
     truth = math.degrees(KATANA.truths["standard"].values["theta_offset_3"])
     assert rows["theta_offset_3"]["calibrate"] == pytest.approx(truth, abs=0.02)
     assert rows["theta_offset_3"]["deviation"] > 0.0
@@ -120,7 +124,11 @@ def test_frames_of_the_file_are_held_where_the_readings_are_in_them() -> None:
     result = truearm.influence(own, data, placement="robot", combination="scaled-mean")
     assert result.identified is not None
     assert result.identified.frames == "robot"
-    errors = {way: one.position.mean for way, one in result.identified.errors.items() if one.position is not None}
+    errors = {
+        way: errors_of_way.position.mean
+        for way, errors_of_way in result.identified.errors.items()
+        if errors_of_way.position is not None
+    }
     assert errors["least squares"] < 0.05e-3 < errors["influence"]
     with pytest.raises(InputError, match="does not say where this target is") as refusal:
         truearm.influence(KATANA, data, placement="robot")
@@ -130,9 +138,9 @@ def test_frames_of_the_file_are_held_where_the_readings_are_in_them() -> None:
 def test_poses_that_cannot_be_met_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     from truearm.simulation import influence as job
 
-    def unmet(*given: Any, **options: Any) -> PoseByPose:
-        made = influence_based(*given, **options)
-        return replace(made, converged=np.arange(len(made.converged)) > 1)
+    def unmet(*arguments: Any, **options: Any) -> PoseByPose:
+        identified = influence_based(*arguments, **options)
+        return replace(identified, converged=np.arange(len(identified.converged)) > 1)
 
     monkeypatch.setattr(job, "influence_based", unmet)
     result = truearm.influence(KATANA, measured(), model="offsets", train=20)
@@ -143,7 +151,7 @@ def test_poses_that_cannot_be_met_are_told(monkeypatch: pytest.MonkeyPatch) -> N
 def test_an_arm_of_three_joints_is_identified_too() -> None:
     result = truearm.influence("li3", truearm.simulate("li3", truth="random", poses=12, noise=1e-3).data)
     assert result.identified is not None
-    assert all(np.isfinite(one.position_norms).all() for one in result.identified.errors.values())
+    assert all(np.isfinite(errors.position_norms).all() for errors in result.identified.errors.values())
 
 
 @pytest.mark.parametrize(
@@ -161,22 +169,22 @@ def test_an_arm_of_three_joints_is_identified_too() -> None:
     ],
 )
 def test_refusals(options: dict[str, Any], parameter: str, says: str) -> None:
-    given = {"robot": KATANA} | options
-    if given.get("data") is measured:
-        given["data"] = measured()
-    elif given.get("data") in ("distances", "ballbar"):
-        robot = "irb120" if given["data"] == "ballbar" else KATANA
-        given["data"] = truearm.simulate(robot, truth="nominal", poses=6, device="ballbar").data
-    elif given.get("data") == "fixtures":
+    arguments = {"robot": KATANA} | options
+    if arguments.get("data") is measured:
+        arguments["data"] = measured()
+    elif arguments.get("data") in ("distances", "ballbar"):
+        robot = "irb120" if arguments["data"] == "ballbar" else KATANA
+        arguments["data"] = truearm.simulate(robot, truth="nominal", poses=6, device="ballbar").data
+    elif arguments.get("data") == "fixtures":
         data = measured()
-        given["data"] = replace(data, fixtures=("plate",), fixture=np.zeros(len(data.target), dtype=np.intp))
+        arguments["data"] = replace(data, fixtures=("plate",), fixture=np.zeros(len(data.target), dtype=np.intp))
     with pytest.raises(InputError, match=says) as refusal:
-        truearm.influence(**given)
+        truearm.influence(**arguments)
     assert refusal.value.parameter == parameter
 
 
 def test_files_hold_every_pose(tmp_path: Path) -> None:
-    result = found()
+    result = influence_result()
     written = result.save(tmp_path)
     assert [path.name for path in written] == ["influence.csv", "result.json", "report.html"]
     with (tmp_path / "influence.csv").open(newline="") as file:
@@ -185,9 +193,9 @@ def test_files_hold_every_pose(tmp_path: Path) -> None:
     assert {row["configuration"] for row in rows} == set(measured().labels)
     first = rows[0]
     assert float(first["moved [mm]"]) == pytest.approx(1e3 * result.made.size[0, 0], rel=1e-5)
-    held = json.loads((tmp_path / "result.json").read_text())
-    assert held["truearm"] == "truearm-influence/1"
-    assert len(held["parameters"]) == len(result.made.names)
+    content = json.loads((tmp_path / "result.json").read_text())
+    assert content["truearm"] == "truearm-influence/1"
+    assert len(content["parameters"]) == len(result.made.names)
     page = (tmp_path / "report.html").read_text()
     for place in ("influence", "map", "errors"):
         assert f'id="{place}"' in page

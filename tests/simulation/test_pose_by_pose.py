@@ -64,11 +64,13 @@ def mean_error(robot: Robot, data: Dataset) -> float:
 def test_each_set_explains_its_own_pose(method: Method) -> None:
     """Judged by the twin, whose frames are products of matrices."""
     data = readings(drawn(1.0, 1), 12, NOISE, 1)
-    found = method(katana(), data)
-    assert found.converged.all()
-    assert found.sets.shape == (12, 17)
-    assert (found.iterations >= 1).all()
-    for reading, position, vector, left in zip(data.joints, data.position, found.sets, found.left, strict=True):
+    identified = method(katana(), data)
+    assert identified.converged.all()
+    assert identified.sets.shape == (12, 17)
+    assert (identified.iterations >= 1).all()
+    for reading, position, vector, left in zip(
+        data.joints, data.position, identified.sets, identified.left, strict=True
+    ):
         tip = Twin(with_set(katana(), vector)).target_frames(reading)["tip"][:3, 3]
         assert np.linalg.norm(tip - position) < 1e-5
         assert np.linalg.norm(tip - position) == pytest.approx(left, abs=1e-12)
@@ -101,8 +103,8 @@ def position_jacobian(robot: Robot, data: Dataset) -> tuple[Array, Array]:
 
 def test_small_errors_are_given_the_smallest_step_in_rad_and_mm() -> None:
     data = readings(drawn(1e-3, 3), 5, 0.0, 3)
-    found = standard(katana(), data, tolerance=1e-13)
-    for error, J, vector in zip(*position_jacobian(katana(), data), found.sets, strict=True):
+    identified = standard(katana(), data, tolerance=1e-13)
+    for error, J, vector in zip(*position_jacobian(katana(), data), identified.sets, strict=True):
         counted = J * UNIT
         expected = UNIT * (counted.T @ np.linalg.solve(counted @ counted.T, error))
         np.testing.assert_allclose((vector - values(katana())) / UNIT, expected / UNIT, rtol=0, atol=1e-9)
@@ -113,9 +115,9 @@ def test_small_errors_are_given_the_smallest_step_in_rad_and_mm() -> None:
 def test_small_errors_end_where_steps_weighted_by_influence_are_smallest(damping: float) -> None:
     """And C changes the number of iterations only."""
     data = readings(drawn(1e-3, 4), 5, 0.0, 4)
-    found = by_influence(katana(), data, tolerance=1e-13, damping=damping)
+    identified = by_influence(katana(), data, tolerance=1e-13, damping=damping)
     k = influence(katana(), data.joints, NAMES, "tip", PERTURBATIONS).vector.T
-    for error, J, weight, vector in zip(*position_jacobian(katana(), data), k, found.sets, strict=True):
+    for error, J, weight, vector in zip(*position_jacobian(katana(), data), k, identified.sets, strict=True):
         counted = J * UNIT
         expected = weight * (counted.T @ np.linalg.solve((counted * weight) @ counted.T, error))
         np.testing.assert_allclose((vector - values(katana())) / UNIT, expected, rtol=0, atol=1e-9)
@@ -146,34 +148,34 @@ def test_lengths_hardly_move_in_rad_and_mm_and_do_in_units_of_their_priors() -> 
 def test_the_robot_has_the_mean_of_the_sets(method: Method) -> None:
     start = katana()
     known = replace(start.parameters["a_3"], deviation=1e-5, informed=0.5)
-    found = method(start.with_parameters([known]), readings(drawn(1.0, 6), 9, NOISE, 6))
-    np.testing.assert_allclose(values(found.robot), found.sets.mean(axis=0), rtol=0, atol=1e-15)
-    assert found.robot.parameters["a_3"].deviation is None
-    assert found.robot.parameters["a_3"].informed is None
-    held = set(found.robot.parameters) - set(NAMES)
-    assert all(found.robot.values[name] == start.values[name] for name in held)
-    assert "9 poses one at a time" in found.robot.history[-1]
+    identified = method(start.with_parameters([known]), readings(drawn(1.0, 6), 9, NOISE, 6))
+    np.testing.assert_allclose(values(identified.robot), identified.sets.mean(axis=0), rtol=0, atol=1e-15)
+    assert identified.robot.parameters["a_3"].deviation is None
+    assert identified.robot.parameters["a_3"].informed is None
+    fixed = set(identified.robot.parameters) - set(NAMES)
+    assert all(identified.robot.values[name] == start.values[name] for name in fixed)
+    assert "9 poses one at a time" in identified.robot.history[-1]
 
 
 @BOTH
 def test_the_best_pose_is_the_one_whose_set_fits_all_poses_best(method: Method) -> None:
     data = readings(drawn(1.0, 7), 9, NOISE, 7)
-    found = method(katana(), data, combination="best-pose")
-    errors = [mean_error(with_set(katana(), vector), data) for vector in found.sets]
-    np.testing.assert_array_equal(values(found.robot), found.sets[int(np.argmin(errors))])
-    assert mean_error(found.robot, data) == min(errors)
+    identified = method(katana(), data, combination="best-pose")
+    errors = [mean_error(with_set(katana(), vector), data) for vector in identified.sets]
+    np.testing.assert_array_equal(values(identified.robot), identified.sets[int(np.argmin(errors))])
+    assert mean_error(identified.robot, data) == min(errors)
 
 
 @BOTH
 def test_the_scale_of_the_mean_is_the_one_that_fits_best(method: Method) -> None:
     data = readings(drawn(1.0, 8), 20, NOISE, 8)
-    found = method(katana(), data, combination="scaled-mean")
-    start, mean = values(katana()), found.sets.mean(axis=0)
-    along, taken = mean - start, values(found.robot) - start
+    identified = method(katana(), data, combination="scaled-mean")
+    start, mean = values(katana()), identified.sets.mean(axis=0)
+    along, taken = mean - start, values(identified.robot) - start
     scale = float(along @ taken / (along @ along))
     np.testing.assert_allclose(taken, scale * along, rtol=0, atol=1e-15)
     assert scale > 1.2
-    best = np.sum(errors_of(found.robot, data).position_errors ** 2)
+    best = np.sum(errors_of(identified.robot, data).position_errors ** 2)
     for other in (0.99 * scale, 1.01 * scale, 1.0):
         assert np.sum(errors_of(with_set(katana(), start + other * along), data).position_errors ** 2) > best
 
@@ -245,8 +247,8 @@ def test_only_positions_of_the_target_count() -> None:
         position=position,
         sigma=np.full(12, NOISE),
     )
-    found = standard(katana(), both)
-    np.testing.assert_array_equal(found.sets, standard(katana(), data.of_configurations([0, 2, 3, 4, 5])).sets)
+    identified = standard(katana(), both)
+    np.testing.assert_array_equal(identified.sets, standard(katana(), data.of_configurations([0, 2, 3, 4, 5])).sets)
     alone = least_squares(katana(), data.of_configurations([0, 2, 3, 4, 5]), NAMES, "tip")
     np.testing.assert_array_equal(values(least_squares(katana(), both, NAMES, "tip")), values(alone))
 
@@ -259,10 +261,12 @@ def test_readings_without_declared_deviation_count_with_that_of_the_document() -
 
 def test_a_pose_that_the_parameters_cannot_explain_says_so() -> None:
     data = readings(drawn(1.0, 4), 3, 0.0, 4)
-    found = minimum_norm(katana(), data, ["theta_offset_1"], "tip")
-    assert not found.converged.any()
-    assert (found.left > 1e-5).all()
-    for reading, position, (theta,), left in zip(data.joints, data.position, found.sets, found.left, strict=True):
+    identified = minimum_norm(katana(), data, ["theta_offset_1"], "tip")
+    assert not identified.converged.any()
+    assert (identified.left > 1e-5).all()
+    for reading, position, (theta,), left in zip(
+        data.joints, data.position, identified.sets, identified.left, strict=True
+    ):
         for other in (theta - 1e-4, theta, theta + 1e-4):  # as close as the parameter gets
             tip = Twin(katana().with_values({"theta_offset_1": other})).target_frames(reading)["tip"][:3, 3]
             assert np.linalg.norm(tip - position) > left - 1e-9
@@ -296,6 +300,6 @@ def test_what_cannot_be_identified_is_refused(options: dict[str, Any], message: 
 def test_a_target_without_positions_is_refused(method: Callable[..., object]) -> None:
     data = readings(katana(), 3, NOISE, 0)
     elsewhere = katana().with_frames(katana().base, {"tip": (0, 0, 0), "second": (0.1, 0, 0)})
-    for given in (data, replace(data, targets=("second",), position=np.full((3, 3), np.nan))):
+    for unseen in (data, replace(data, targets=("second",), position=np.full((3, 3), np.nan))):
         with pytest.raises(InputError, match=r"no position reading of this target.*second"):
-            method(elsewhere, given, ["a_3", "a_4", "d_5"], "second")
+            method(elsewhere, unseen, ["a_3", "a_4", "d_5"], "second")

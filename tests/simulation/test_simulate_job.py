@@ -47,23 +47,23 @@ def test_the_model_with_warm_up_predicts_what_is_read() -> None:
 def test_a_truth_is_a_name_a_file_or_a_robot(tmp_path: Path) -> None:
     file = tmp_path / "truth.yaml"
     file.write_text(robot_text(truearm.load_robot("irb120")))
-    said = [
+    simulations = [
         truearm.simulate("irb120", truth=truth, poses=4, noise=1e-5, out=tmp_path / "data.csv")
         for truth in ("nominal", file, truearm.load_robot("irb120"))
     ]
-    for other in said[1:]:
-        assert np.array_equal(said[0].data.position, other.data.position)
-    assert said[0].lines() == [
+    for other in simulations[1:]:
+        assert np.array_equal(simulations[0].data.position, other.data.position)
+    assert simulations[0].lines() == [
         "SIMULATED: measurements of a virtual instrument, not of a robot.",
         f"4 configurations of irb120 (nominal), 12 readings of 3 targets: {tmp_path / 'data.csv'}",
     ]
     assert truearm.load_data(tmp_path / "data.csv").configurations == 4
-    one = truearm.simulate("irb120", truth="nominal", poses=1, device="ballbar")
-    assert one.lines()[1].startswith("1 configuration of irb120 (nominal), 1 reading of 1 target against cup_")
+    single = truearm.simulate("irb120", truth="nominal", poses=1, device="ballbar")
+    assert single.lines()[1].startswith("1 configuration of irb120 (nominal), 1 reading of 1 target against cup_")
 
 
 @pytest.mark.parametrize(
-    ("given", "parameter", "words"),
+    ("options", "parameter", "words"),
     [
         ({"noise": None}, "noise", "no noise is given. Give `noise`, or a `device`"),
         ({"truth": "randon"}, "truth", "Did you mean random"),
@@ -73,9 +73,9 @@ def test_a_truth_is_a_name_a_file_or_a_robot(tmp_path: Path) -> None:
         ({"poses": 0}, "poses", "allowed: 1 to 50000"),
     ],
 )
-def test_what_cannot_be_simulated(given: dict[str, object], parameter: str, words: str) -> None:
+def test_what_cannot_be_simulated(options: dict[str, object], parameter: str, words: str) -> None:
     with pytest.raises(InputError, match=words) as refusal:
-        truearm.simulate("irb120", **{"truth": "nominal", "poses": 3, "noise": 1e-4, **given})  # type: ignore[arg-type]
+        truearm.simulate("irb120", **{"truth": "nominal", "poses": 3, "noise": 1e-4, **options})  # type: ignore[arg-type]
     assert refusal.value.parameter == parameter
 
 

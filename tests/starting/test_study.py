@@ -51,7 +51,7 @@ def test_json_is_what_the_file_holds(truearm: Truearm, quick: None, tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("irb120-sim",), "NAME: there is no study of this name"),
         (("irb120-simulation",), "--data: this study needs measured data"),
@@ -60,14 +60,14 @@ def test_json_is_what_the_file_holds(truearm: Truearm, quick: None, tmp_path: Pa
     ],
 )
 def test_refusals(
-    truearm: Truearm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], said: str
+    truearm: Truearm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], message: str
 ) -> None:
     needy = [replace(e, files=("joints.txt",)) if e.name == "irb120-simulation" else e for e in STUDIES]
     monkeypatch.setattr(papers, "STUDIES", needy)
     run = truearm("study", *words, "--out", tmp_path)
     assert run.code == 2
     assert run.out == ""
-    assert said in run.err
+    assert message in run.err
     assert not list(tmp_path.iterdir())
 
 

@@ -116,7 +116,7 @@ def test_a_result_of_another_plan_is_not_drawn_and_one_that_is_none_is_refused(t
     window.edit(performance={"plan": f"other/{PLAN}", "result": "kept"})
     act(page._drawn._draw, True)
     assert "its errors are not drawn" in page._drawn._said.content
-    assert "(other-plan)" in page._of.content
+    assert "(other-settings)" in page._of.content
     assert jog.scene._parts["tests-errors"] == []
     assert len(jog.scene._parts["tests-frame"]) == 1
     window.edit(robot="kr5")
@@ -151,7 +151,7 @@ def test_the_page_says_what_its_result_is_of_and_what_of_that_is_not_chosen_now(
     table = page._table.content
 
     act(page._choices["poses"], "other.csv")
-    said = "(other-measurements)</b>: This result is of poses mine.csv. Chosen now: poses other.csv. Evaluate again."
+    said = "(other-settings)</b>: This result is of poses mine.csv. Chosen now: poses other.csv. Evaluate again."
     assert said in page._of.content
     act(page._choices["poses"], "none.csv")
     act(page._run)
@@ -184,7 +184,7 @@ def test_the_page_says_what_its_result_is_of_and_what_of_that_is_not_chosen_now(
     assert not page._drawn._draw.value
     window.edit(robot="ur5e")
     said = "The plan that is chosen and this result are of the robot irb120, and ur5e is chosen."
-    assert f"(other-plan)</b>: {said}" in page._of.content
+    assert f"(other-settings)</b>: {said}" in page._of.content
     window.edit(robot="irb120")
     robot = (tested / "iso9283" / ROBOT).read_text()
     (tested / "iso9283" / ROBOT).write_text(f"{robot}\n")

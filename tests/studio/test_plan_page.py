@@ -251,7 +251,7 @@ def told(page: PlanPage) -> str:
     """Return what the first line of the page says of the plan that stands there."""
     assert page._other.visible is bool(page._other.content)
     assert page._other.order < page.fields.element("poses").order
-    assert ("(other-plan-settings)" in page._other.content) is page._other.visible
+    assert ("(other-settings)" in page._other.content) is page._other.visible
     return unescape(page._other.content)
 
 

@@ -20,29 +20,29 @@ def test_the_histogram_holds_every_pair() -> None:
     data = seen(20, 1)
     robot = truearm.calibrate("irb120", data, model="frames").robot
     judged = truearm.distances(robot, data)
-    found = judged.errors
-    assert found.pairs == int(found.counts.sum()) == 9 * 20 * 19 // 2
-    first, *_ = found.edges.tolist()
-    width = float(f"{np.diff(found.edges)[0]:.12g}")
+    result = judged.errors
+    assert result.pairs == int(result.counts.sum()) == 9 * 20 * 19 // 2
+    first, *_ = result.edges.tolist()
+    width = float(f"{np.diff(result.edges)[0]:.12g}")
     assert f"{width:e}"[0] in "125"
     assert first == pytest.approx(round(first / width) * width)
-    said, figures, share, *bars = judged.lines()[1:]
-    assert said == "1710 distances between points of 20 configurations of twin:"
+    messages, figures, share, *bars = judged.lines()[1:]
+    assert messages == "1710 distances between points of 20 configurations of twin:"
     assert (
         figures
-        == f"  mean {1e3 * found.mean:.3f}  deviation {1e3 * found.deviation:.3f}  max {1e3 * found.maximum:.3f} mm"
+        == f"  mean {1e3 * result.mean:.3f}  deviation {1e3 * result.deviation:.3f}  max {1e3 * result.maximum:.3f} mm"
     )
-    assert share == f"  {100 * found.positive:.0f} % of the predicted distances are too long"
-    step = max(1, len(found.counts) // 20)
-    sums = [int(found.counts[k : k + step].sum()) for k in range(0, len(found.counts), step)]
+    assert share == f"  {100 * result.positive:.0f} % of the predicted distances are too long"
+    step = max(1, len(result.counts) // 20)
+    sums = [int(result.counts[k : k + step].sum()) for k in range(0, len(result.counts), step)]
     assert [bar.count("#") for bar in bars] == [round(50 * count / max(sums)) for count in sums]
-    assert [float(bar.split()[0]) for bar in bars] == pytest.approx(1e3 * found.edges[:-1:step], abs=6e-4)
-    ends = [*(1e3 * found.edges[step:-1:step]), 1e3 * found.edges[-1]]
+    assert [float(bar.split()[0]) for bar in bars] == pytest.approx(1e3 * result.edges[:-1:step], abs=6e-4)
+    ends = [*(1e3 * result.edges[step:-1:step]), 1e3 * result.edges[-1]]
     assert [float(bar.split()[2]) for bar in bars] == pytest.approx(ends, abs=6e-4)
-    told = judged.summary()
-    assert (told["configurations"], told["positive"]) == (20, found.positive)
-    assert told["distance_mm"]["max"] == pytest.approx(1e3 * found.maximum)
-    assert told["histogram"]["counts"] == found.counts.tolist()
+    content = judged.summary()
+    assert (content["configurations"], content["positive"]) == (20, result.positive)
+    assert content["distance_mm"]["max"] == pytest.approx(1e3 * result.maximum)
+    assert content["histogram"]["counts"] == result.counts.tolist()
 
 
 def test_loads_and_readings_that_do_not_fit_are_refused() -> None:
@@ -52,7 +52,7 @@ def test_loads_and_readings_that_do_not_fit_are_refused() -> None:
     warm = robot.with_effects(["thermal-growth"])
     for arm, readings, parameter, words in (
         ("irb120", data, "robot", "the robot has no targets"),
-        (robot, replace(data, targets=("1", "2", "x")), "target", "no target of this name"),
+        (robot, replace(data, targets=("1", "2", "x"), source="t.csv"), "data", "^t.csv: .* no target of this name"),
         (robot, nothing, "data", "there is no reading"),
         (warm, data, "data", "the data hold no temperature"),
         (robot, data.of_configurations([0]), "data", "two configurations or more"),

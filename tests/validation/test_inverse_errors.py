@@ -144,10 +144,10 @@ def test_summary_says_by_how_much_the_largest_error_fell(lines: SevenLines) -> N
     assert reduction(before, after, "xy") == pytest.approx(75.0)
     robot = load_robot("kr5")
     joints = lines.joints(robot)
-    said = LineTest(robot, lines, joints, True, before, after).summary()
-    assert said["poses"] == 77
-    assert [line["direction"] for line in said["lines"]] == list(DIRECTIONS)
-    assert said["lines"][0]["after_mm"] == pytest.approx({"mean": 1.0, "max": 1.0})
+    words = LineTest(robot, lines, joints, True, before, after).summary()
+    assert words["poses"] == 77
+    assert [line["direction"] for line in words["lines"]] == list(DIRECTIONS)
+    assert words["lines"][0]["after_mm"] == pytest.approx({"mean": 1.0, "max": 1.0})
     assert "after_mm" not in LineTest(robot, lines, joints, False, before, None).summary()["lines"][0]
 
 
@@ -167,22 +167,22 @@ def test_the_job_compensates_on_a_twin_and_writes_what_to_command(lines: SevenLi
     plan = truearm.lines("kr5", CENTRE)
     assert (plan.before, plan.after, plan.lines()) == (None, None, ["The robot can go to all 77 poses."])
     assert_allclose(plan.joints, lines.joints(nominal), atol=1e-12)
-    found = truearm.lines("kr5", CENTRE, joint_errors=errors, truth=errors, repeats=1, out=tmp_path / "plan.csv")
-    assert found.before is not None
-    assert found.after is not None
-    assert_allclose(found.before.error, np.linalg.norm(errors.world_poses(plan.joints)[0] - lines.position, axis=1))
-    assert found.after.error.max() < 5e-6
-    for line, said in zip(found.summary()["lines"], found.lines()[1:], strict=True):
+    result = truearm.lines("kr5", CENTRE, joint_errors=errors, truth=errors, repeats=1, out=tmp_path / "plan.csv")
+    assert result.before is not None
+    assert result.after is not None
+    assert_allclose(result.before.error, np.linalg.norm(errors.world_poses(plan.joints)[0] - lines.position, axis=1))
+    assert result.after.error.max() < 5e-6
+    for line, words in zip(result.summary()["lines"], result.lines()[1:], strict=True):
         rows = lines.rows(line["direction"])
-        before, after = found.before.error[rows] * 1e3, found.after.error[rows] * 1e3
+        before, after = result.before.error[rows] * 1e3, result.after.error[rows] * 1e3
         assert (line["before_mm"]["mean"], line["after_mm"]["max"]) == pytest.approx((before.mean(), after.max()))
         assert line["reduction_percent"] == pytest.approx(100 * (1 - after.max() / before.max()))
-        assert f"mean {before.mean():.3f}  max {before.max():.3f} mm   compensated mean {after.mean():.3f}" in said
+        assert f"mean {before.mean():.3f}  max {before.max():.3f} mm   compensated mean {after.mean():.3f}" in words
     table = [row.split(",") for row in (tmp_path / "plan.csv").read_text().splitlines()]
     assert table[0] == ["configuration", *(f"joint_{k} [deg]" for k in range(1, 7))]
     assert [row[0] for row in table[1:]] == list(lines.labels)
-    assert_allclose(np.array([row[1:] for row in table[1:]], float), np.degrees(found.joints), atol=1e-9)
-    assert found.written_at("x").endswith("77 configurations, compensated joint positions.")
+    assert_allclose(np.array([row[1:] for row in table[1:]], float), np.degrees(result.joints), atol=1e-9)
+    assert result.written_at("x").endswith("77 configurations, compensated joint positions.")
     assert plan.written_at("x").endswith("77 configurations, nominal joint positions.")
 
 
@@ -204,13 +204,13 @@ def test_the_job_judges_what_was_measured_in_the_frame_of_one_of_its_robots(line
 
 
 def test_the_job_refuses_what_does_not_go_together() -> None:
-    for given, parameter, said in (
+    for value, parameter, words in (
         ({"truth": "random", "data": "x.csv"}, "truth, data", "only one of them"),
         ({"joint_errors": "kr5"}, "joint_errors", "not described by joint errors"),
         ({"joint_errors": converted(load_robot("irb1600"), CONVENTION)}, "joint_errors", "another robot than kr5"),
         ({"size": (0.6, 0.0, 0.4)}, "size", "three sizes above zero"),
         ({"centre": (2.85, 0.0, 0.6)}, "centre", "cannot go to a pose"),
     ):
-        with pytest.raises(InputError, match=said) as refusal:
-            truearm.lines("kr5", **{"centre": CENTRE, **given})  # type: ignore[arg-type]
+        with pytest.raises(InputError, match=words) as refusal:
+            truearm.lines("kr5", **{"centre": CENTRE, **value})  # type: ignore[arg-type]
         assert refusal.value.parameter == parameter

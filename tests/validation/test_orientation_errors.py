@@ -36,9 +36,9 @@ def test_angles_come_back_in_every_quadrant() -> None:
 
 def test_angles_without_a_middle_one() -> None:
     turned = zxz(np.array([[0.3, 0.0, 0.4], [0.3, np.pi, 0.4]]))
-    found = zxz_angles(turned)
-    assert np.abs(zxz(found) - turned).max() < 1e-12
-    assert found[:, 2].tolist() == [0.0, 0.0]
+    result = zxz_angles(turned)
+    assert np.abs(zxz(result) - turned).max() < 1e-12
+    assert result[:, 2].tolist() == [0.0, 0.0]
 
 
 def with_poses(turned: Array, joints: Array) -> tuple[Robot, Dataset]:
@@ -68,17 +68,17 @@ def test_a_turn_about_an_axis_of_the_base_shows_there() -> None:
     rng = np.random.default_rng(1)
     joints = load_robot("irb120").random_configurations(20, rng)
     robot, data = with_poses(about("x", np.full(20, 0.01)), joints)
-    found = orientation_errors(robot, data, errors_of(robot, data))
-    assert found is not None
-    assert found.vector == pytest.approx(np.tile([0.01, 0.0, 0.0], (20, 1)), abs=1e-9)
+    result = orientation_errors(robot, data, errors_of(robot, data))
+    assert result is not None
+    assert result.vector == pytest.approx(np.tile([0.01, 0.0, 0.0], (20, 1)), abs=1e-9)
     # A turn about the base's z axis is an error of Phi alone.
     robot, data = with_poses(about("z", np.full(20, 0.01)), joints)
-    found = orientation_errors(robot, data, errors_of(robot, data))
-    assert found is not None
-    assert found.zxz[np.isfinite(found.zxz[:, 0])] == pytest.approx(
-        np.tile([0.01, 0.0, 0.0], (20 - found.locked, 1)), abs=1e-9
+    result = orientation_errors(robot, data, errors_of(robot, data))
+    assert result is not None
+    assert result.zxz[np.isfinite(result.zxz[:, 0])] == pytest.approx(
+        np.tile([0.01, 0.0, 0.0], (20 - result.locked, 1)), abs=1e-9
     )
-    held = orientation_block(found).held["orientation_parts_deg"]
+    held = orientation_block(result).in_json["orientation_parts_deg"]
     assert held["rotation_vector"]["rz"]["mean"] == pytest.approx(np.degrees(0.01))
     assert held["zxz"]["phi"]["max"] == pytest.approx(np.degrees(0.01))
 
@@ -89,20 +89,20 @@ def test_angles_across_half_a_turn_differ_by_little() -> None:
     phi = float(zxz_angles(robot.base.rotation.T @ robot.world_poses(joints, "tool")[1])[0, 0])
     joints[0, 0] = np.pi - 0.5e-3 - phi  # joint 1 turns about the base's z axis, so Phi goes with it
     robot, data = with_poses(about("z", np.full(1, -1e-3)), joints)
-    found = orientation_errors(robot, data, errors_of(robot, data))
-    assert found is not None
-    assert found.zxz[0] == pytest.approx([-1e-3, 0.0, 0.0], abs=1e-9)
+    result = orientation_errors(robot, data, errors_of(robot, data))
+    assert result is not None
+    assert result.zxz[0] == pytest.approx([-1e-3, 0.0, 0.0], abs=1e-9)
 
 
 def test_where_the_middle_angle_is_nearly_zero_the_others_are_left_out() -> None:
     joints = np.radians([[0.0, 0.0, 0.0, 0.0, 90.0, 0.0], [0.0, 0.0, 0.0, 0.0, 45.0, 0.0]])
     robot, data = with_poses(about("x", np.full(2, 1e-4)), joints)
-    found = orientation_errors(robot, data, errors_of(robot, data))
-    assert found is not None
-    assert found.locked == 1
-    assert np.isnan(found.zxz[0, [0, 2]]).all()
-    assert np.isfinite(found.zxz[1]).all()
-    (line,) = orientation_block(found).lines
+    result = orientation_errors(robot, data, errors_of(robot, data))
+    assert result is not None
+    assert result.locked == 1
+    assert np.isnan(result.zxz[0, [0, 2]]).all()
+    assert np.isfinite(result.zxz[1]).all()
+    (line,) = orientation_block(result).lines
     assert "(Phi and Psi without 1 readings near Theta 0 or 180)" in line
     alone = orientation_errors(robot, data.of_configurations([0]), errors_of(robot, data.of_configurations([0])))
     assert alone is not None
@@ -121,16 +121,16 @@ def test_parts_are_drawn_and_tabled_in_degrees() -> None:
     joints[0] = np.radians([0.0, 0.0, 0.0, 0.0, 90.0, 0.0])  # Theta is nearly zero there
     robot, data = with_poses(about("x", np.linspace(1e-3, 3e-3, 8)), joints)
     judged = validate(robot, data)
-    found = judged.orientations
-    assert found is not None
-    assert found.locked == 1
+    result = judged.orientations
+    assert result is not None
+    assert result.locked == 1
     traces = validation_figures(judged)["orientation-parts"]["data"]
     assert [trace["name"] for trace in traces] == ["rx", "ry", "rz", "Φ", "Θ", "Ψ"]
-    for trace, values in zip(traces, [*found.vector.T, *found.zxz.T], strict=True):
+    for trace, values in zip(traces, [*result.vector.T, *result.zxz.T], strict=True):
         assert trace["y"] == pytest.approx(np.degrees(values[np.isfinite(values)]), abs=1e-4)
     assert len({trace["marker"]["color"] for trace in traces}) == 4  # one for all three angles
     page = validation_html(judged)
-    for name, part in found.parts.items():
+    for name, part in result.parts.items():
         assert part is not None
         shown = {"phi": "Φ", "theta": "Θ", "psi": "Ψ"}.get(name, name)
         count = 7 if name in ("phi", "psi") else 8

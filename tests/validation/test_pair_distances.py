@@ -22,32 +22,32 @@ def points(n: int, seed: int) -> tuple[Array, Array]:
 @pytest.mark.parametrize("n", [2, 3, 257, 900])
 def test_as_by_all_pairs_at_once(n: int) -> None:
     predicted, measured = points(n, n)
-    found = pair_distances(predicted, measured)
+    result = pair_distances(predicted, measured)
     errors = pdist(predicted) - pdist(measured)
-    assert found.pairs == len(errors) == found.counts.sum()
-    assert (found.mean, found.deviation) == pytest.approx((np.abs(errors).mean(), np.abs(errors).std()), rel=1e-9)
-    assert found.maximum == pytest.approx(np.abs(errors).max(), rel=1e-12)
-    assert found.positive == pytest.approx((errors > 0).mean(), abs=1e-12)
-    assert np.abs(found.counts - np.histogram(errors, found.edges)[0]).sum() <= 2  # at an edge, by rounding
-    assert found.counts[0] > 0
-    assert found.counts[-1] > 0
+    assert result.pairs == len(errors) == result.counts.sum()
+    assert (result.mean, result.deviation) == pytest.approx((np.abs(errors).mean(), np.abs(errors).std()), rel=1e-9)
+    assert result.maximum == pytest.approx(np.abs(errors).max(), rel=1e-12)
+    assert result.positive == pytest.approx((errors > 0).mean(), abs=1e-12)
+    assert np.abs(result.counts - np.histogram(errors, result.edges)[0]).sum() <= 2  # at an edge, by rounding
+    assert result.counts[0] > 0
+    assert result.counts[-1] > 0
 
 
 def test_pairs_within_a_configuration_do_not_count_and_order_does_not_matter() -> None:
     predicted, measured = points(300, 1)
     of = np.random.default_rng(2).integers(0, 40, 300)
-    found = pair_distances(predicted, measured, of)
+    result = pair_distances(predicted, measured, of)
     i, j = np.triu_indices(300, 1)
     apart = of[i] != of[j]
     errors = (pdist(predicted) - pdist(measured))[apart]
-    assert found.pairs == apart.sum()
-    assert (found.mean, found.maximum) == pytest.approx((np.abs(errors).mean(), np.abs(errors).max()), rel=1e-9)
+    assert result.pairs == apart.sum()
+    assert (result.mean, result.maximum) == pytest.approx((np.abs(errors).mean(), np.abs(errors).max()), rel=1e-9)
 
 
 def test_a_rigid_motion_and_nothing_wrong() -> None:
     _, measured = points(50, 3)
-    found = pair_distances(measured, measured)
-    assert (found.mean, found.maximum, found.positive) == (0.0, 0.0, 0.0)
+    result = pair_distances(measured, measured)
+    assert (result.mean, result.maximum, result.positive) == (0.0, 0.0, 0.0)
     turned = measured @ np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]) + [1, 2, 3]
     assert pair_distances(turned, measured).maximum < 1e-14
 
@@ -58,19 +58,24 @@ def test_close_points_and_large_errors_are_as_right_as_others(size: float) -> No
     rng = np.random.default_rng(6)
     measured = rng.uniform(-0.6, 0.6, (4, 3))[rng.integers(0, 4, 700)] + rng.normal(0, 2e-5, (700, 3))
     predicted = measured + rng.normal(0, size, (700, 3))
-    found, errors = pair_distances(predicted, measured), pdist(predicted) - pdist(measured)
-    assert (found.mean, found.deviation) == pytest.approx((np.abs(errors).mean(), np.abs(errors).std()), rel=1e-9)
-    assert found.maximum == pytest.approx(np.abs(errors).max(), rel=1e-12)
-    assert found.positive == pytest.approx((errors > 0).mean(), abs=1e-12)
+    result, errors = pair_distances(predicted, measured), pdist(predicted) - pdist(measured)
+    assert (result.mean, result.deviation) == pytest.approx((np.abs(errors).mean(), np.abs(errors).std()), rel=1e-9)
+    assert result.maximum == pytest.approx(np.abs(errors).max(), rel=1e-12)
+    assert result.positive == pytest.approx((errors > 0).mean(), abs=1e-12)
 
 
 def test_results_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     predicted, measured = points(900, 7)
     two = pair_distances(predicted, measured)
     monkeypatch.setattr("truearm.validation.distances._THREADS", 1)
-    one = pair_distances(predicted, measured)
-    assert (one.mean, one.deviation, one.maximum, one.positive) == (two.mean, two.deviation, two.maximum, two.positive)
-    assert (one.counts == two.counts).all()
+    outcome = pair_distances(predicted, measured)
+    assert (outcome.mean, outcome.deviation, outcome.maximum, outcome.positive) == (
+        two.mean,
+        two.deviation,
+        two.maximum,
+        two.positive,
+    )
+    assert (outcome.counts == two.counts).all()
 
 
 def test_memory_is_bounded() -> None:

@@ -66,18 +66,18 @@ def test_an_instrument_that_was_carried_elsewhere_is_told_and_found() -> None:
     assert re.search(
         r"moved by \d+(\.\d+)? mm at their middle and turned by 4\d(\.\d+)? deg as a whole", notice.message
     )
-    found = validate(robot, there, refit="base")
-    assert found.warnings == ()
-    assert found.position is not None
+    result = validate(robot, there, refit="base")
+    assert result.warnings == ()
+    assert result.position is not None
     assert honest.position is not None
-    assert honest.position.mean < found.position.mean < 1.4 * honest.position.mean
-    assert found.refit is not None
-    assert (found.refit.parameters, found.refit.readings) == (6, 45)
+    assert honest.position.mean < result.position.mean < 1.4 * honest.position.mean
+    assert result.refit is not None
+    assert (result.refit.parameters, result.refit.readings) == (6, 45)
     middle = new.position.mean(axis=0)
-    assert found.refit.shift == pytest.approx(np.linalg.norm(TURN @ middle + SHIFT - middle), abs=1e-3)
-    assert found.refit.turn == pytest.approx(np.linalg.norm([0.1, -0.2, 0.7]), abs=1e-3)
-    assert "The base was found anew from 45 readings (6 numbers)" in "\n".join(found.lines())
-    assert found.summary()["refit"]["turn_deg"] == pytest.approx(math.degrees(math.sqrt(0.54)), abs=0.1)
+    assert result.refit.shift == pytest.approx(np.linalg.norm(TURN @ middle + SHIFT - middle), abs=1e-3)
+    assert result.refit.turn == pytest.approx(np.linalg.norm([0.1, -0.2, 0.7]), abs=1e-3)
+    assert "The base was found anew from 45 readings (6 numbers)" in "\n".join(result.lines())
+    assert result.summary()["refit"]["turn_deg"] == pytest.approx(math.degrees(math.sqrt(0.54)), abs=0.1)
 
 
 @pytest.mark.parametrize("angle", [2e-3, 2.0])
@@ -88,14 +88,14 @@ def test_a_tool_that_was_mounted_anew_is_told_and_found_alone(angle: float) -> N
     assert notice.code == "tool-moved"
     assert "`refit=tool`" in notice.message
     assert "mm at the middle of its targets and turned by" in notice.message
-    found = validate(robot, moved, refit="tool")
-    assert found.warnings == ()
-    assert found.position is not None
-    assert found.position.mean < 0.15e-3
-    assert found.refit is not None
-    assert found.refit.turn == pytest.approx(angle, abs=3e-4)
+    result = validate(robot, moved, refit="tool")
+    assert result.warnings == ()
+    assert result.position is not None
+    assert result.position.mean < 0.15e-3
+    assert result.refit is not None
+    assert result.refit.turn == pytest.approx(angle, abs=3e-4)
     for name in ("base_x", "base_y", "base_z"):
-        assert found.refit.robot.values[name] == pytest.approx(robot.values[name], abs=1e-12)
+        assert result.refit.robot.values[name] == pytest.approx(robot.values[name], abs=1e-12)
 
 
 def test_a_target_that_was_put_on_anew_is_named() -> None:
@@ -107,11 +107,11 @@ def test_a_target_that_was_put_on_anew_is_named() -> None:
     assert notice.code == "tool-moved"
     assert f"target {name} by " in notice.message
     assert "`refit=targets`" in notice.message
-    found = validate(robot, moved, refit="targets")
-    assert found.refit is not None
-    assert found.refit.turn is None
-    assert found.refit.shifts[name] == pytest.approx(2e-3, abs=2e-4)
-    assert max(shift for other, shift in found.refit.shifts.items() if other != name) < 3e-4
+    result = validate(robot, moved, refit="targets")
+    assert result.refit is not None
+    assert result.refit.turn is None
+    assert result.refit.shifts[name] == pytest.approx(2e-3, abs=2e-4)
+    assert max(shift for other, shift in result.refit.shifts.items() if other != name) < 3e-4
 
 
 def test_base_and_tool_that_were_both_moved_are_told() -> None:
@@ -136,12 +136,12 @@ def test_the_errors_of_a_refit_are_those_of_configurations_it_has_not_seen() -> 
     """Against fitting again without each configuration."""
     _, robot, new = cell()
     few = new.of_configurations(np.arange(6))
-    found = refit(robot, few, "tool")
+    result = refit(robot, few, "tool")
     for c in range(6):
         others = refit(robot, few.of_configurations([i for i in range(6) if i != c]), "tool")
         alone = errors_of(others.robot, few.of_configurations([c])).position_errors
-        mine = few.configuration == c
-        assert found.errors.position_errors[mine] == pytest.approx(alone, abs=2e-7)
+        rows = few.configuration == c
+        assert result.errors.position_errors[rows] == pytest.approx(alone, abs=2e-7)
 
 
 def test_honest_readings_are_left_alone() -> None:
@@ -157,8 +157,8 @@ def test_honest_readings_are_left_alone() -> None:
 
 def test_single_targets_exchanged_names_and_too_few_readings() -> None:
     _, robot, new = cell()
-    found = refit(robot, new.of_readings(new.target == 0), "tool")
-    assert (found.parameters, found.turn) == (3, None)  # it is shifted and not turned
+    result = refit(robot, new.of_readings(new.target == 0), "tool")
+    assert (result.parameters, result.turn) == (3, None)  # it is shifted and not turned
     (notice,) = validate(robot, replace(new, targets=("2", "3", "1")), refit="targets").warnings
     assert notice.code == "targets-renamed"
     with pytest.raises(InputError, match="too few") as told:
@@ -173,11 +173,11 @@ def test_the_command_finds_what_moved(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(robot_text(robot))
     (tmp_path / "moved.csv").write_text(csv_text(replace(new, position=new.position + SHIFT)))
     words = ["validate", str(tmp_path / "robot.yaml"), str(tmp_path / "moved.csv")]
-    told = CliRunner().invoke(program(), words)
-    assert told.exit_code == 3
-    assert "--refit base" in told.output
+    outcome = CliRunner().invoke(program(), words)
+    assert outcome.exit_code == 3
+    assert "--refit base" in outcome.output
     done = CliRunner().invoke(program(), [*words, "--refit", "base", "--note", "operator=A B", "--json"])
     assert done.exit_code == 0, done.output
-    found = json.loads(done.stdout)
-    assert found["refit"]["shift_mm"] == pytest.approx(1e3 * float(np.linalg.norm(SHIFT)), abs=0.2)
-    assert found["notes"] == {"operator": "A B"}
+    content = json.loads(done.stdout)
+    assert content["refit"]["shift_mm"] == pytest.approx(1e3 * float(np.linalg.norm(SHIFT)), abs=0.2)
+    assert content["notes"] == {"operator": "A B"}

@@ -32,31 +32,31 @@ def run() -> Calibration:
 
 
 def distances(robot: Robot, data: Dataset) -> RegionDistances:
-    found = region_distances(robot, data, errors_of(robot, data))
-    assert found is not None
-    return found
+    result = region_distances(robot, data, errors_of(robot, data))
+    assert result is not None
+    return result
 
 
 def test_training_configurations_are_no_distance_away(run: Calibration) -> None:
-    found = distances(run.robot, run.data.of_configurations(run.training))
-    assert found.training == 30
-    assert found.tip.max() < 20e-6  # positions are kept to a thousandth of a degree
-    assert np.degrees(found.joints.max()) < 0.001
+    result = distances(run.robot, run.data.of_configurations(run.training))
+    assert result.training == 30
+    assert result.tip.max() < 20e-6  # positions are kept to a thousandth of a degree
+    assert np.degrees(result.joints.max()) < 0.001
 
 
 def test_distances_are_those_of_the_nearest_configuration(run: Calibration) -> None:
     data = run.data.of_configurations(run.held_out)
-    found = distances(run.robot, data)
+    result = distances(run.robot, data)
     training = run.data.of_configurations(run.training).joints
     for row in (0, 7, 20):
-        reading = found.reading[row]
+        reading = result.reading[row]
         target, joints = data.targets[data.target[reading]], data.joints[data.configuration[reading]]
         places = run.robot.forward(training, target=target)[0]
         here = run.robot.forward(joints, target=target)[0][0]
-        assert found.tip[row] == pytest.approx(np.linalg.norm(places - here, axis=1).min(), abs=5e-5)
+        assert result.tip[row] == pytest.approx(np.linalg.norm(places - here, axis=1).min(), abs=5e-5)
         apart = np.abs(np.angle(np.exp(1j * (training - joints))))  # whole turns do not count
-        assert found.joints[row] == pytest.approx(apart.max(axis=1).min(), abs=1e-4)
-        assert found.middle[row] == pytest.approx(np.linalg.norm(places.mean(axis=0) - here), abs=5e-5)
+        assert result.joints[row] == pytest.approx(apart.max(axis=1).min(), abs=1e-4)
+        assert result.middle[row] == pytest.approx(np.linalg.norm(places.mean(axis=0) - here), abs=5e-5)
 
 
 def test_whole_turns_are_the_same_posture(run: Calibration) -> None:
@@ -91,9 +91,9 @@ def test_a_robot_that_does_not_know_is_judged_without(run: Calibration) -> None:
     assert proof is not None
     older = replace(run.robot, proof=replace(proof, measured=()))
     assert region_distances(older, run.data, errors_of(older, run.data)) is None
-    found = validate(older, run.data.of_configurations(run.held_out))
-    assert found.distances is None
-    assert "distance_from_training" not in found.summary()
+    result = validate(older, run.data.of_configurations(run.held_out))
+    assert result.distances is None
+    assert "distance_from_training" not in result.summary()
 
 
 def test_a_thousand_configurations_are_kept_at_most() -> None:
@@ -114,7 +114,7 @@ def test_errors_that_grow_with_the_distance_are_told() -> None:
     (step,) = measure_farther(grows)
     assert step.code == "measure-more"
     assert "Calibrate with configurations that reach farther" in step.message
-    held = distance_block(grows).held["distance_from_training"]
+    held = distance_block(grows).in_json["distance_from_training"]
     assert (held["grows"], held["joints_deg"]) == (True, [])
     spans = grows.spans(grows.tip)
     assert [span.readings for span in spans] == [18] * 5
@@ -130,21 +130,21 @@ def test_errors_that_grow_with_the_distance_are_told() -> None:
 def test_the_page_draws_every_error_over_every_distance(run: Calibration) -> None:
     data = run.data.of_configurations(run.held_out)
     judged = validate(run.robot, data)
-    found = judged.distances
-    assert found is not None
+    result = judged.distances
+    assert result is not None
     drawn = validation_figures(judged)
     assert {*drawn} == {"error-over-tip", "error-over-joints", "error-over-middle", "residuals"}
     for name, distance in (
-        ("tip", 1e3 * found.tip),
-        ("joints", np.degrees(found.joints)),
-        ("middle", 1e3 * found.middle),
+        ("tip", 1e3 * result.tip),
+        ("joints", np.degrees(result.joints)),
+        ("middle", 1e3 * result.middle),
     ):
         readings, mean = drawn[f"error-over-{name}"]["data"]
         assert readings["type"] == "scatter"
         assert readings["x"] == pytest.approx(distance, rel=6e-4)
-        assert readings["y"] == pytest.approx(1e3 * found.error, rel=6e-4)
+        assert readings["y"] == pytest.approx(1e3 * result.error, rel=6e-4)
         assert readings["text"][4] == f"{data.labels[data.configuration[4]]}, target {data.targets[data.target[4]]}"
-        spans = found.spans(distance)
+        spans = result.spans(distance)
         assert mean["name"] == "mean of a fifth of the readings"
         assert mean["x"] == pytest.approx([v for span in spans for v in (span.low, span.high)], rel=6e-4)
         assert mean["y"] == pytest.approx([1e3 * span.mean for span in spans for _ in range(2)], rel=6e-4)
@@ -152,7 +152,7 @@ def test_the_page_draws_every_error_over_every_distance(run: Calibration) -> Non
     page = validation_html(judged)
     assert f"On {judged.errors.configurations} configurations" in judged.lines()[1]
     assert "knows 30 training configurations" in page
-    span = found.spans(found.tip)[1]
+    span = result.spans(result.tip)[1]
     row = f"{significant(1e3 * span.low, 3, 1)} to {significant(1e3 * span.high, 3, 1)}"
     for cell in (row, str(span.readings), significant(1e3 * span.mean), significant(1e3 * span.largest)):
         assert f">{cell}</td>" in page
@@ -160,11 +160,11 @@ def test_the_page_draws_every_error_over_every_distance(run: Calibration) -> Non
     for value in (judged.position.mean, judged.position.rms, judged.position.p95, judged.position.max):
         assert f">{significant(1e3 * value)}</td>" in page
     sums = judged.summary()["distance_from_training"]
-    assert [row["mean_mm"] for row in sums["tip_mm"]] == pytest.approx([1e3 * s.mean for s in found.spans(found.tip)])
-    degrees = [np.degrees(s.high) for s in found.spans(found.joints)]
+    assert [row["mean_mm"] for row in sums["tip_mm"]] == pytest.approx([1e3 * s.mean for s in result.spans(result.tip)])
+    degrees = [np.degrees(s.high) for s in result.spans(result.joints)]
     assert [row["to"] for row in sums["joints_deg"]] == pytest.approx(degrees)
-    words = f"tips {1e3 * found.tip.min():.0f} to {1e3 * found.tip.max():.0f} mm, joints "
-    assert words + f"{np.degrees(found.joints.min()):.0f} to {np.degrees(found.joints.max()):.0f} deg" in "\n".join(
+    words = f"tips {1e3 * result.tip.min():.0f} to {1e3 * result.tip.max():.0f} mm, joints "
+    assert words + f"{np.degrees(result.joints.min()):.0f} to {np.degrees(result.joints.max()):.0f} deg" in "\n".join(
         judged.lines()
     )
 
@@ -176,10 +176,10 @@ def test_readings_beyond_what_the_proof_lets_expect_are_told(run: Calibration) -
     off = rng.standard_normal(data.position.shape)
     for size, levels in ((0.03e-3, []), (0.12e-3, ["warning"]), (3e-3, ["error"])):
         moved = replace(data, position=data.position + size * off)
-        told = check_proof(run.robot, moved, errors_of(run.robot, moved))
-        assert [notice.level for notice in told] == levels, size
+        notices = check_proof(run.robot, moved, errors_of(run.robot, moved))
+        assert [notice.level for notice in notices] == levels, size
     rms = 1e3 * np.sqrt(np.mean(errors_of(run.robot, moved).position_norms ** 2))
-    assert f"The positions are off by {rms:.2g} mm (root mean square)" in told[0].message
+    assert f"The positions are off by {rms:.2g} mm (root mean square)" in notices[0].message
     quiet = replace(moved, sigma=None)
     (assumed,) = check_proof(run.robot, quiet, errors_of(run.robot, quiet))
     assert "with 0.1 mm of noise, since no sigma is declared" in assumed.message

@@ -35,19 +35,19 @@ def test_a_model_that_is_the_twin_leaves_nothing_and_finds_the_centre(arm: Robot
     centre = np.array([0.3, 0.1, 0.2])
     read = lengths(Twin(arm), joints, centre)
     assert sphere_test(arm, joints, read, "1", centre).largest < 1e-12
-    found = sphere_test(arm, joints, read, "1")
-    assert found.centre == pytest.approx(centre, abs=1e-11)
-    assert found.largest < 1e-11
+    result = sphere_test(arm, joints, read, "1")
+    assert result.centre == pytest.approx(centre, abs=1e-11)
+    assert result.largest < 1e-11
 
 
 def test_figures_are_those_of_measured_minus_predicted_lengths(arm: Robot) -> None:
     joints = arm.random_configurations(3, np.random.default_rng(1))
     centre = np.zeros(3)
     added = np.array([0.1e-3, -0.3e-3, 0.5e-3])
-    found = sphere_test(arm, joints, lengths(Twin(arm), joints, centre) + added, "1", centre)
-    assert found.mean == pytest.approx(0.1e-3)
-    assert found.deviation == pytest.approx(0.4e-3)
-    assert found.largest == pytest.approx(0.5e-3)
+    result = sphere_test(arm, joints, lengths(Twin(arm), joints, centre) + added, "1", centre)
+    assert result.mean == pytest.approx(0.1e-3)
+    assert result.deviation == pytest.approx(0.4e-3)
+    assert result.largest == pytest.approx(0.5e-3)
     missing = np.append(lengths(Twin(arm), joints, centre)[:2], np.nan)
     assert len(sphere_test(arm, joints, missing, "1", centre).errors) == 2
 
@@ -113,17 +113,17 @@ def test_the_job_judges_each_target_about_the_ball_before_and_after_calibration(
     centre = other.world_poses(joints[:1], "1")[0][0]
     data = read_by_bars(Twin(other), joints, centre)
     for taught in (None, "taught"):
-        found = truearm.sphere(other, data, taught_at=taught, out=tmp_path / f"{taught}.html")
-        counts = [(one.target, one.fixture, len(one.lengths), one.left_out) for one in found.spheres]
+        result = truearm.sphere(other, data, taught_at=taught, out=tmp_path / f"{taught}.html")
+        counts = [(sphere.target, sphere.fixture, len(sphere.lengths), sphere.left_out) for sphere in result.spheres]
         assert counts == [("1", "ball", 28, 1 if taught else 2), ("2", "ball", 29, 0)]
-        for one in found.spheres:
+        for one in result.spheres:
             assert one.after.largest < 1e-9
             assert one.after.centre == pytest.approx(centre, abs=1e-9)
             assert one.before is not None
             assert one.before.deviation > 0.1e-3
-    lines = "\n".join(found.lines())
+    lines = "\n".join(result.lines())
     assert "from the centre that was taught at configuration taught:" in lines
-    for one, told in zip(found.spheres, found.summary()["spheres"], strict=True):
+    for one, told in zip(result.spheres, result.summary()["spheres"], strict=True):
         assert one.before is not None
         lost = ", 1 beyond the range of the bar" if one.left_out else ""
         assert f"{one.target} about ball, {len(one.lengths)} readings{lost}\n  nominal     mean " in lines
@@ -131,12 +131,12 @@ def test_the_job_judges_each_target_about_the_ball_before_and_after_calibration(
         assert told["nominal_mm"]["largest"] == pytest.approx(1e3 * one.before.largest)
         assert told["robot_mm"]["deviation"] == pytest.approx(1e3 * one.after.deviation)
     page = (tmp_path / "taught.html").read_text()
-    for test in (found.spheres[0].before, found.spheres[1].before):
+    for test in (result.spheres[0].before, result.spheres[1].before):
         assert test is not None
         for value in (test.mean, test.deviation, test.largest):
             assert f">{1e3 * value:.3f}</td>" in page
     alone = truearm.sphere(arm, data)
-    assert all(one.before is None for one in alone.spheres)
+    assert all(sphere.before is None for sphere in alone.spheres)
     assert "  this robot  mean" in "\n".join(alone.lines())
 
 
@@ -150,10 +150,10 @@ def test_pose_errors_are_those_that_were_put_in() -> None:
     turned = R * Rotation.from_rotvec(axes / np.linalg.norm(axes, axis=1)[:, None] * angles[:, None])
     wanted = np.einsum("nij,kj->nki", R.as_matrix(), points) + p[:, None]
     reached = np.einsum("nij,kj->nki", turned.as_matrix(), points) + (p + shifts)[:, None]
-    found = pose_errors(points, wanted, reached)
-    assert found.orientation == pytest.approx(angles, abs=1e-12)
-    assert found.position == pytest.approx(np.linalg.norm(shifts, axis=1), abs=1e-14)
-    assert found.points == pytest.approx(np.linalg.norm(reached - wanted, axis=2))
+    result = pose_errors(points, wanted, reached)
+    assert result.orientation == pytest.approx(angles, abs=1e-12)
+    assert result.position == pytest.approx(np.linalg.norm(shifts, axis=1), abs=1e-14)
+    assert result.points == pytest.approx(np.linalg.norm(reached - wanted, axis=2))
     with pytest.raises(InputError, match="poses have different shapes"):
         pose_errors(points, wanted, reached[:4])
 

@@ -55,16 +55,16 @@ def true() -> Robot:
 
 def test_a_sphere_is_judged_before_and_after_calibration(true: Robot) -> None:
     data = _bar(true, 40, 1e-6)
-    found = package.sphere(true, data)
-    (one,) = found.spheres
-    assert (one.target, one.fixture, len(one.lengths), one.left_out) == ("ball", "cup", 39, 2)
-    assert one.after.largest < 4e-6
-    assert known(one.before).deviation > 0.2e-3
-    assert found.summary()["spheres"][0]["nominal_mm"]["deviation"] > 0.2
+    result = package.sphere(true, data)
+    (sphere,) = result.spheres
+    assert (sphere.target, sphere.fixture, len(sphere.lengths), sphere.left_out) == ("ball", "cup", 39, 2)
+    assert sphere.after.largest < 4e-6
+    assert known(sphere.before).deviation > 0.2e-3
+    assert result.summary()["spheres"][0]["nominal_mm"]["deviation"] > 0.2
     taught = package.sphere(true, data, taught_at="taught")
     assert taught.spheres[0].after.centre == pytest.approx([0.3, 0.1, 0.2], abs=1e-8)
     assert taught.spheres[0].after.largest < 4e-6
-    errors, fitted = (known(each).errors for each in (taught.spheres[0].before, one.before))
+    errors, fitted = (known(each).errors for each in (taught.spheres[0].before, sphere.before))
     assert (errors**2).sum() > (fitted**2).sum()  # teaching had errors of its own
     assert "taught at configuration taught" in taught.lines()[0]
     alone = package.sphere("irb120", data, tip=(0.01, 0.0, 0.125))
@@ -87,7 +87,7 @@ def test_what_no_sphere_test_is_made_of_is_refused(true: Robot, tmp_path: Path) 
     refused("taught_at", "no configuration of this name", package.sphere, true, data, taught_at="x")
     without = replace(data, distance=np.full(31, np.nan))
     refused(None, "no distances of a ballbar", package.sphere, true, without)
-    refused(None, "ball", package.sphere, "irb120", data)
+    refused("data", "no target of this name; got 'ball'", package.sphere, "irb120", data)
     refused(None, "too few lengths", package.sphere, true, data.of_configurations([0, 1, 2, 3]))
     (tmp_path / "bar.csv").write_text(csv_text(data).replace("distance [mm]", "distance"))
     refused(None, "no unit is given", package.sphere, true, tmp_path / "bar.csv")

@@ -34,8 +34,8 @@ def test_small_angles_are_equation_20() -> None:
 
 
 def test_tolerances_of_the_kr5_follow_table_3() -> None:
-    found = joint_tolerances(with_table_3(), [0.05] * 6)
-    for tolerance, (ebeta, egamma, *place) in zip(found, TABLE_3, strict=True):
+    result = joint_tolerances(with_table_3(), [0.05] * 6)
+    for tolerance, (ebeta, egamma, *place) in zip(result, TABLE_3, strict=True):
         assert tolerance.delta == pytest.approx(0.05 * math.radians(math.hypot(ebeta, egamma)), rel=1e-4)
         assert_allclose(np.array(tolerance.position) * 1e3, place, atol=1e-12)
 
@@ -45,7 +45,7 @@ def test_no_draw_within_the_tolerances_does_more_than_the_worst() -> None:
     rng = np.random.default_rng(0)
     q = robot.random_configurations(30, rng)
     leans, places = np.full(6, 1e-4), np.full(6, 5e-5)
-    found = flange_error(robot, leans.tolist(), places.tolist(), q)
+    result = flange_error(robot, leans.tolist(), places.tolist(), q)
     nominal = robot.world_poses(q)[0]
     seen = []
     for _ in range(300):
@@ -57,14 +57,14 @@ def test_no_draw_within_the_tolerances_does_more_than_the_worst() -> None:
             for name, step in zip(("ebeta", "egamma", "ex", "ey", "ez"), (ebeta, egamma, *shift), strict=True):
                 values[f"{name}_{i}"] += step
         seen.append(np.linalg.norm(robot.with_values(values).world_poses(q)[0] - nominal, axis=1).max())
-    assert max(seen) < found.together[0] * 1.001
-    assert max(seen) > 0.5 * found.together[1]
+    assert max(seen) < result.together[0] * 1.001
+    assert max(seen) > 0.5 * result.together[1]
 
 
 def test_the_worst_side_of_one_joint_is_met() -> None:
     robot = with_table_3()
     q = robot.random_configurations(10, np.random.default_rng(1))
-    found = flange_error(robot, [0, 1e-5, 0, 0, 0, 0], [0.0] * 6, q)
+    result = flange_error(robot, [0, 1e-5, 0, 0, 0, 0], [0.0] * 6, q)
     moved = []
     for towards in np.linspace(0, 2 * np.pi, 361):
         ebeta, egamma = errors_of_tolerance(1e-5, float(towards), 1.0)
@@ -72,17 +72,17 @@ def test_the_worst_side_of_one_joint_is_met() -> None:
         moved.append(
             np.linalg.norm(robot.with_values(values).world_poses(q)[0] - robot.world_poses(q)[0], axis=1).max()
         )
-    assert found.leaning[1] == pytest.approx(max(moved), rel=1e-4)
-    assert found.leaning[[0, 2, 3, 4, 5]].max() == 0.0
+    assert result.leaning[1] == pytest.approx(max(moved), rel=1e-4)
+    assert result.leaning[[0, 2, 3, 4, 5]].max() == 0.0
 
 
 def test_the_job_says_what_errors_use_in_millimetres_and_degrees() -> None:
     robot, depths = with_table_3(), [0.05, 0.06, 0.05, 0.05, 0.05, 0.07]
-    found = truearm.tolerance(robot, depths)
-    told = found.summary()
-    assert told["robot"] == robot.name
-    rows = [line.split() for line in found.lines() if line.split()[0].isdigit()]
-    for row, shown, depth, used in zip(told["joints"], rows, depths, joint_tolerances(robot, depths), strict=True):
+    result = truearm.tolerance(robot, depths)
+    content = result.summary()
+    assert content["robot"] == robot.name
+    rows = [line.split() for line in result.lines() if line.split()[0].isdigit()]
+    for row, shown, depth, used in zip(content["joints"], rows, depths, joint_tolerances(robot, depths), strict=True):
         assert row["depth_mm"] == pytest.approx(1e3 * depth)
         assert row["lean_mm"] == pytest.approx(1e3 * used.delta)
         assert row["towards_deg"] == pytest.approx(math.degrees(used.towards))
@@ -93,24 +93,24 @@ def test_the_job_says_what_errors_use_in_millimetres_and_degrees() -> None:
 
 
 def test_the_job_says_what_tolerances_allow_at_the_flange() -> None:
-    found = truearm.tolerance("kr5", 0.05, lean=[0, 2e-5, 0, 0, 0, 1e-5], position=1e-5)
+    result = truearm.tolerance("kr5", 0.05, lean=[0, 2e-5, 0, 0, 0, 1e-5], position=1e-5)
     robot = converted(truearm.load_robot("kr5"), CONVENTION)
     angles = [math.atan(lean / 0.05) for lean in (0, 2e-5, 0, 0, 0, 1e-5)]
     q = robot.random_configurations(2000, np.random.default_rng(0))
     expected = flange_error(robot, angles, [1e-5] * 6, q)
-    told = found.summary()
-    assert told["configurations"] == 2000
-    assert [row["angle_deg"] for row in told["joints"]] == pytest.approx(np.degrees(angles))
-    assert [row["by_lean_mm"] for row in told["joints"]] == pytest.approx(1e3 * expected.leaning)
-    assert [row["by_position_mm"] for row in told["joints"]] == [pytest.approx(0.01)] * 6
-    worst, root = told["together"]["worst_mm"], told["together"]["root_of_squares_mm"]
+    content = result.summary()
+    assert content["configurations"] == 2000
+    assert [row["angle_deg"] for row in content["joints"]] == pytest.approx(np.degrees(angles))
+    assert [row["by_lean_mm"] for row in content["joints"]] == pytest.approx(1e3 * expected.leaning)
+    assert [row["by_position_mm"] for row in content["joints"]] == [pytest.approx(0.01)] * 6
+    worst, root = content["together"]["worst_mm"], content["together"]["root_of_squares_mm"]
     assert (worst, root) == pytest.approx((1e3 * expected.together[0], 1e3 * expected.together[1]))
     # places count for all joints alike, and leaning adds to them at one and the same configuration
-    assert 0.06 + told["joints"][1]["by_lean_mm"] < worst <= 0.06 + told["joints"][1]["by_lean_mm"] + 1e-2
-    assert f"  joint 2: {told['joints'][1]['by_lean_mm']:.4f} mm by leaning 0.0229 deg, 0.0100 mm" in "\n".join(
-        found.lines()
+    assert 0.06 + content["joints"][1]["by_lean_mm"] < worst <= 0.06 + content["joints"][1]["by_lean_mm"] + 1e-2
+    assert f"  joint 2: {content['joints'][1]['by_lean_mm']:.4f} mm by leaning 0.0229 deg, 0.0100 mm" in "\n".join(
+        result.lines()
     )
-    assert f"  all at their worst {worst:.3f} mm, root of the sum of squares {root:.3f} mm" in "\n".join(found.lines())
+    assert f"  all at their worst {worst:.3f} mm, root of the sum of squares {root:.3f} mm" in "\n".join(result.lines())
     places = truearm.tolerance("kr5", 0.05, position=1e-5).summary()["together"]
     assert (places["worst_mm"], places["root_of_squares_mm"]) == pytest.approx((0.06, 0.01 * 6**0.5))
 
@@ -126,7 +126,7 @@ def test_what_no_tolerance_is_is_refused() -> None:
         ({"position": -1e-3}, "position", "out of range"),
         ({}, "robot", "not described by joint errors"),
     ]
-    for given, parameter, said in cases:
-        with pytest.raises(InputError, match=said) as refusal:
-            truearm.tolerance("kr5", **{"depth": 0.05, **given})
+    for value, parameter, words in cases:
+        with pytest.raises(InputError, match=words) as refusal:
+            truearm.tolerance("kr5", **{"depth": 0.05, **value})
         assert refusal.value.parameter == parameter

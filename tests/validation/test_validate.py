@@ -30,12 +30,12 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Dataset]
 
 def test_training_readings_are_noticed(calibrated: tuple[Path, Dataset]) -> None:
     folder, _ = calibrated
-    found = validate(folder / "result" / "calibrated.yaml", folder / "first.csv")
-    (notice,) = found.warnings
+    result = validate(folder / "result" / "calibrated.yaml", folder / "first.csv")
+    (notice,) = result.warnings
     assert (notice.code, notice.level) == ("training-data", "warning")
     assert "20 of their 30 configurations are those it was trained on; the rest was held out" in notice.message
-    assert found.lines()[-1].startswith("Warning (training-data): ")
-    assert found.summary()["warnings"] == [notice.summary()]
+    assert result.lines()[-1].startswith("Warning (training-data): ")
+    assert result.summary()["warnings"] == [notice.summary()]
 
 
 def test_new_readings_are_left_alone(calibrated: tuple[Path, Dataset]) -> None:
@@ -52,19 +52,19 @@ def test_renamed_targets_are_told(calibrated: tuple[Path, Dataset]) -> None:
     assert (notice.code, notice.level) == ("targets-renamed", "error")
     assert "2 is 1, 3 is 2, 1 is 3" in notice.message
     (folder / "renamed.csv").write_text(csv_text(renamed))
-    told = CliRunner().invoke(
+    outcome = CliRunner().invoke(
         program(), ["validate", str(folder / "result" / "calibrated.yaml"), str(folder / "renamed.csv"), "--json"]
     )
-    assert told.exit_code == 3
-    assert json.loads(told.stdout)["warnings"][0]["code"] == "targets-renamed"
+    assert outcome.exit_code == 3
+    assert json.loads(outcome.stdout)["warnings"][0]["code"] == "targets-renamed"
 
 
 def test_a_page_and_its_figures_are_written(calibrated: tuple[Path, Dataset], tmp_path: Path) -> None:
     folder, new = calibrated
-    found = validate(folder / "result" / "calibrated.yaml", new, out=tmp_path / "out", notes={"serial": "4711"})
+    result = validate(folder / "result" / "calibrated.yaml", new, out=tmp_path / "out", notes={"serial": "4711"})
     content = json.loads((tmp_path / "out" / "result.json").read_text())
     assert content["truearm"] == "truearm-validation/1"
-    assert {name: content[name] for name in found.summary()} == found.summary()
+    assert {name: content[name] for name in result.summary()} == result.summary()
     assert sum(span["readings"] for span in content["distance_from_training"]["tip_mm"]) == 36
     page = (tmp_path / "out" / "report.html").read_text()
     for place in ("error-over-tip", "error-over-joints", "error-over-middle", "residuals"):
@@ -72,11 +72,11 @@ def test_a_page_and_its_figures_are_written(calibrated: tuple[Path, Dataset], tm
     assert "orientation-parts" not in page
     assert "4711" in page
     assert "truearm.validate(" in content["command"]
-    assert "From the nearest of 20 training configurations: tips " in "\n".join(found.lines())
+    assert "From the nearest of 20 training configurations: tips " in "\n".join(result.lines())
     words = ["validate", folder / "result" / "calibrated.yaml", folder / "first.csv", "--out", tmp_path / "x"]
-    told = CliRunner().invoke(program(), list(map(str, words)))
-    assert told.exit_code == 0
-    assert told.stdout.splitlines()[-1] == f"Written to {tmp_path / 'x'}: result.json, report.html"
+    outcome = CliRunner().invoke(program(), list(map(str, words)))
+    assert outcome.exit_code == 0
+    assert outcome.stdout.splitlines()[-1] == f"Written to {tmp_path / 'x'}: result.json, report.html"
 
 
 def test_the_folder_of_a_calibration_is_not_written_over(calibrated: tuple[Path, Dataset], tmp_path: Path) -> None:

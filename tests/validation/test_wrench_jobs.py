@@ -45,8 +45,8 @@ def cell(campaign: tuple[Twin, Robot], tmp_path: Path) -> Path:
     return tmp_path
 
 
-def codes(found: Any) -> set[str]:
-    return {notice.code for notice in found.warnings}
+def codes(result: Any) -> set[str]:
+    return {notice.code for notice in result.warnings}
 
 
 # -- inverse ---------------------------------------------------------------------------------------------
@@ -58,13 +58,13 @@ def test_the_target_goes_to_the_pose_under_the_force(campaign: tuple[Twin, Robot
     wanted = robot.forward(q, target="1")
     frames: tuple[Any, ...] = ("base", "tool", "world", "controller")
     for frame in frames:
-        found = truearm.inverse(robot, *wanted, seed_joints=q, target="1", wrench=TEXT, wrench_frame=frame)
-        assert "force-taken" in codes(found), frame
+        solution = truearm.inverse(robot, *wanted, seed_joints=q, target="1", wrench=TEXT, wrench_frame=frame)
+        assert "force-taken" in codes(solution), frame
         pushed = robot.with_wrench(Wrench.of(TEXT, frame), "1")
-        np.testing.assert_allclose(pushed.forward(found.joints, target="1")[0], wanted[0], atol=2e-9, err_msg=frame)
-        assert np.abs(found.joints - q).max() > 1e-5, frame
+        np.testing.assert_allclose(pushed.forward(solution.joints, target="1")[0], wanted[0], atol=2e-9, err_msg=frame)
+        assert np.abs(solution.joints - q).max() > 1e-5, frame
         same = truearm.inverse(robot, *wanted, seed_joints=q, target="1", wrench=Wrench.of(TEXT, frame))
-        np.testing.assert_array_equal(same.joints, found.joints)
+        np.testing.assert_array_equal(same.joints, solution.joints)
 
 
 def test_the_force_acts_on_the_controllers_flange_where_poses_are_the_controllers(campaign: tuple[Twin, Robot]) -> None:
@@ -75,9 +75,9 @@ def test_the_force_acts_on_the_controllers_flange_where_poses_are_the_controller
     robot = replace(robot, controller=replace(robot.controller, flange=flange))
     q = np.full((1, 6), 0.4)
     wanted = robot.forward(q, frame="controller")
-    found = truearm.inverse(robot, *wanted, seed_joints=q, frame="controller", wrench=TEXT, wrench_frame="tool")
+    solution = truearm.inverse(robot, *wanted, seed_joints=q, frame="controller", wrench=TEXT, wrench_frame="tool")
     pushed = robot.with_wrench(Wrench.of(TEXT, "tool"), flange)
-    np.testing.assert_allclose(pushed.forward(found.joints, frame="controller")[0], wanted[0], atol=2e-9)
+    np.testing.assert_allclose(pushed.forward(solution.joints, frame="controller")[0], wanted[0], atol=2e-9)
 
 
 @pytest.mark.parametrize(
@@ -117,16 +117,16 @@ def test_the_command_names_the_option(cell: Path) -> None:
 @pytest.mark.parametrize("device", [None, "tracker"])
 def test_what_is_simulated_under_a_force_says_so(campaign: tuple[Twin, Robot], device: str | None) -> None:
     def worst(data: Dataset, **force: Any) -> tuple[float, set[str]]:
-        told = truearm.validate(robot, data, **force)
-        assert told.position is not None
-        return told.position.max, codes(told)
+        result = truearm.validate(robot, data, **force)
+        assert result.position is not None
+        return result.position.max, codes(result)
 
     _, robot = campaign
-    given: dict[str, Any] = {"truth": robot, "poses": 5, "noise": 0.0, "device": device}
+    options: dict[str, Any] = {"truth": robot, "poses": 5, "noise": 0.0, "device": device}
     force: dict[str, Any] = {"wrench": TEXT, "wrench_frame": "tool", "wrench_at": "2"}
-    data = truearm.simulate(robot, **given, **force).data
+    data = truearm.simulate(robot, **options, **force).data
     assert data.wrench is not None
-    assert truearm.simulate(robot, **given).data.wrench is None
+    assert truearm.simulate(robot, **options).data.wrench is None
     np.testing.assert_allclose(np.linalg.norm(data.wrench[:, :3], axis=1), 8.0)
     bare = replace(data, wrench=None)
     for most, told in (worst(data), worst(bare, **force)):
@@ -178,9 +178,9 @@ def test_data_that_say_the_force_are_told_no_other(campaign: tuple[Twin, Robot])
 
 def test_one_target_is_where_the_force_acts(campaign: tuple[Twin, Robot]) -> None:
     _, robot = campaign
-    one = robot.with_frames(robot.base, {"tip": (0.0, 0.0, 0.12)})
-    given: dict[str, Any] = {"truth": one, "poses": 3, "noise": 0.0, "wrench": TEXT}
-    plain, named = (truearm.simulate(one, **given, wrench_at=at).data for at in (None, "tip"))
+    arm = robot.with_frames(robot.base, {"tip": (0.0, 0.0, 0.12)})
+    options: dict[str, Any] = {"truth": arm, "poses": 3, "noise": 0.0, "wrench": TEXT}
+    plain, named = (truearm.simulate(arm, **options, wrench_at=at).data for at in (None, "tip"))
     np.testing.assert_array_equal(plain.position, named.position)
 
 

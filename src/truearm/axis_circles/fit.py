@@ -102,8 +102,8 @@ class Turn:
         places = np.round(self.joint_position / SAME_POSITION).astype(int)
         lags = []
         for place in np.unique(places):
-            here = places == place
-            forward, backward = (self.error[here & (self.direction == sign)] for sign in (1.0, -1.0))
+            at_place = places == place
+            forward, backward = (self.error[at_place & (self.direction == sign)] for sign in (1.0, -1.0))
             if len(forward) and len(backward):
                 lags.append(float(backward.mean() - forward.mean()))
         return float(np.mean(lags)) if lags else None
@@ -193,24 +193,24 @@ def axis_circles(data: Dataset) -> AxisCircles:
             allowed="four configurations or more in a row of each joint while the others stand still",
             cure="Measure axis by axis, or use 'truearm calibrate' on configurations that move every joint.",
         )
-    found: list[AxisCircle] = []
+    circles: list[AxisCircle] = []
     refused: list[InputError] = []
     for run in runs:
-        refusals, before = [], len(found)
+        refusals, before = [], len(circles)
         for index in range(len(data.targets)):
             try:
-                found += _circle(data, run, index)
+                circles += _circle(data, run, index)
             except InputError as refusal:
                 refusals.append(refusal)
-        if refusals and len(found) == before:
+        if refusals and len(circles) == before:
             raise refusals[0]
         refused += refusals
-    freedom = sum(c.circle.freedom for c in found)
-    together = math.sqrt(sum(c.circle.residual**2 * c.circle.freedom for c in found) / freedom)
+    freedom = sum(c.circle.freedom for c in circles)
+    together = math.sqrt(sum(c.circle.residual**2 * c.circle.freedom for c in circles) / freedom)
     used = set(np.concatenate([run.configurations for run in runs]).tolist())
     excess = 1.0
     if data.sigma is not None:
-        ratio = sum((c.circle.residual / c.circle.sigma) ** 2 * c.circle.freedom for c in found) / freedom
+        ratio = sum((c.circle.residual / c.circle.sigma) ** 2 * c.circle.freedom for c in circles) / freedom
         excess = math.sqrt(ratio) if ratio > _by_chance(freedom) else 1.0
     weighted = tuple(
         replace(
@@ -222,7 +222,7 @@ def axis_circles(data: Dataset) -> AxisCircles:
                 ),
             ),
         )
-        for c in found
+        for c in circles
     )
     return AxisCircles(weighted, data.configurations - len(used), tuple(refused), data.sigma is not None, excess)
 
@@ -236,9 +236,9 @@ def _circle(data: Dataset, run: Run, target: int) -> list[AxisCircle]:
         return []
     first, last = (data.labels[int(i)] for i in run.configurations[[0, -1]])
     name = data.targets[target]
-    where = f"{data.source}, configurations {first} to {last}, joint {run.joint}, target {name}"
+    place = f"{data.source}, configurations {first} to {last}, joint {run.joint}, target {name}"
     sigma = None if data.sigma is None else math.sqrt(float(np.mean(data.sigma[readings] ** 2)))
-    circle = fit_circle(data.position[readings], sigma, where)
+    circle = fit_circle(data.position[readings], sigma, place)
     turn = turn_of(circle, data.joints[data.configuration[readings], run.joint - 1])
     return [AxisCircle(run.joint, name, data.joints[run.configurations].mean(axis=0), turn)]
 
@@ -269,8 +269,8 @@ class AxisProblem:
 
     def linearised(self, vector: Array) -> tuple[Array, Array]:
         """Return the whitened residual ``(rows,)`` and its Jacobian ``(rows, parameters)``."""
-        here = self.at(vector)
-        return here.residual, here.jacobian
+        evaluated = self.at(vector)
+        return evaluated.residual, evaluated.jacobian
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Return nothing: circles alone decide."""
@@ -302,8 +302,8 @@ class AxisEvaluation:
     def _both(self) -> tuple[Array, Array]:
         problem = self.problem
         values = {**problem.robot.values, **problem.free.values(self.vector)}
-        made = [_rows(problem.robot, measured, values, problem.free.names) for measured in problem.circles]
-        return np.concatenate([r for r, _ in made]), np.concatenate([J for _, J in made])
+        parts = [_rows(problem.robot, measured, values, problem.free.names) for measured in problem.circles]
+        return np.concatenate([r for r, _ in parts]), np.concatenate([J for _, J in parts])
 
 
 def _rows(
@@ -380,8 +380,8 @@ class AxisFit:
 
     def combination(self, name: str) -> dict[str, float]:
         """Return what the value of an identified parameter is: a sum of true values with these factors [SI]."""
-        found = {name: 1.0}
-        return found | {r.dropped: -r.members[name] for r in self.redundancies if name in r.members}
+        factors = {name: 1.0}
+        return factors | {r.dropped: -r.members[name] for r in self.redundancies if name in r.members}
 
     def _values(self, step: Array) -> dict[str, float]:
         return {p.name: p.value + float(s) for p, s in zip(self.free.parameters, step, strict=True)}
@@ -416,25 +416,25 @@ def fit_axes(
     chosen = (p.restarted(p.value) for p in robot.parameters.values() if p.group in groups)
     # Of what cannot be told apart the last is held. That shall be the slides along joint axes.
     free = FreeParameters(tuple(sorted(chosen, key=lambda p: p.name.startswith("ez_"))))
-    held = [r.dropped for r in known or ()]
+    fixed = [r.dropped for r in known or ()]
     redundancies = tuple(known or ())
     start = robot.with_parameters(free.parameters)
     problem = AxisProblem(start, circles, free)
     for _ in range(6):
         if known is None:
-            redundancies = find_redundancies(problem, problem.free.start, held)
-        settled = [r.dropped for r in redundancies] == held
-        held = [r.dropped for r in redundancies]
-        if not problem.free.without(held).names:
+            redundancies = find_redundancies(problem, problem.free.start, fixed)
+        settled = [r.dropped for r in redundancies] == fixed
+        fixed = [r.dropped for r in redundancies]
+        if not problem.free.without(fixed).names:
             raise InputError(
                 "the measured axes determine nothing of the robot",
                 where=robot.name,
                 cure="Check units, joint order and signs with 'truearm check ROBOT DATA.csv'.",
             )
-        solution = solve(replace(problem, free=problem.free.without(held)))
-        found = dict(zip(problem.free.without(held).names, solution.vector.tolist(), strict=True))
-        there = tuple(replace(p, value=found.get(p.name, p.nominal)) for p in free.parameters)
-        problem = replace(problem, free=FreeParameters(there))
+        solution = solve(replace(problem, free=problem.free.without(fixed)))
+        values = dict(zip(problem.free.without(fixed).names, solution.vector.tolist(), strict=True))
+        parameters = tuple(replace(p, value=values.get(p.name, p.nominal)) for p in free.parameters)
+        problem = replace(problem, free=FreeParameters(parameters))
         if settled:
             break
     if not solution.converged:
@@ -443,22 +443,22 @@ def fit_axes(
             where=robot.name,
             cure="Check joint order and signs with 'truearm check ROBOT DATA.csv'.",
         )
-    kept = problem.free.without(held)
-    R = np.linalg.qr(solution.jacobian * kept.prior, mode="r")
+    free_parameters = problem.free.without(fixed)
+    R = np.linalg.qr(solution.jacobian * free_parameters.prior, mode="r")
     inverse = np.linalg.inv(R)
-    covariance = (inverse @ inverse.T) * np.outer(kept.prior, kept.prior)
+    covariance = (inverse @ inverse.T) * np.outer(free_parameters.prior, free_parameters.prior)
     identified = tuple(
-        replace(p, deviation=math.sqrt(v)) for p, v in zip(kept.parameters, np.diag(covariance), strict=True)
+        replace(p, deviation=math.sqrt(v)) for p, v in zip(free_parameters.parameters, np.diag(covariance), strict=True)
     )
-    made = start.with_parameters(identified)
+    fitted = start.with_parameters(identified)
     freedom = 4 * len(circles) - len(identified)
     square = float(solution.residual @ solution.residual)
     return AxisFit(
-        robot=made,
+        robot=fitted,
         free=FreeParameters(identified),
         covariance=covariance,
         redundancies=redundancies,
-        moving_flange=_moving_flange(made, redundancies),
+        moving_flange=_moving_flange(fitted, redundancies),
         residual=math.sqrt(square / freedom) if freedom > 0 else None,
     )
 
@@ -476,7 +476,7 @@ def _moving_flange(robot: Robot, redundancies: Sequence[Redundancy], seed: int =
     """Return the held parameters whose combination moves the flange at random configurations."""
     q = robot.random_configurations(20, np.random.default_rng(seed))
     kinematics = robot.forward_kinematics(q)
-    found = []
+    moving = []
     for redundancy in redundancies:
         names = list(redundancy.members)
         weights = np.array([redundancy.members[n] for n in names])
@@ -485,9 +485,9 @@ def _moving_flange(robot: Robot, redundancies: Sequence[Redundancy], seed: int =
             together = np.tensordot(weights, part, axes=1)
             alone = max(float(np.abs(w * p).max()) for w, p in zip(weights, part, strict=True))
             if float(np.abs(together).max()) > _NO_MOTION * alone:
-                found.append(redundancy.dropped)
+                moving.append(redundancy.dropped)
                 break
-    return tuple(found)
+    return tuple(moving)
 
 
 #: Tables of parameters that are made of the axes; parallel axes leave only Hayati's.
@@ -528,18 +528,18 @@ class AxisAnalysis:
 
     def _with_targets(self, robot: Robot) -> Robot:
         position, rotation = robot.world_poses(self.data.postures)
-        there = self.data.has_position
+        has_position = self.data.has_position
         places = {}
         for index, name in enumerate(self.data.targets):
-            mine = np.flatnonzero((self.data.target == index) & there)
-            at = self.data.configuration[mine]
-            seen = np.einsum("nji,nj->ni", rotation[at], self.data.position[mine] - position[at])
+            rows = np.flatnonzero((self.data.target == index) & has_position)
+            at = self.data.configuration[rows]
+            seen = np.einsum("nji,nj->ni", rotation[at], self.data.position[rows] - position[at])
             places[name] = seen.mean(axis=0)
-        made = robot.with_frames(robot.base, places)
-        kept = {n: p for n, p in robot.parameters.items() if p.group in ("geometry", "joint zero")}
-        said = f"calibrated axis by axis on {len(self.found.circles)} circles of {self.data.source}"
-        found = replace(made.with_parameters(kept.values()), history=(*robot.history, said), proof=None)
-        return found.marked(self.data.simulated)
+        placed = robot.with_frames(robot.base, places)
+        parameters = {n: p for n, p in robot.parameters.items() if p.group in ("geometry", "joint zero")}
+        remark = f"calibrated axis by axis on {len(self.found.circles)} circles of {self.data.source}"
+        calibrated = replace(placed.with_parameters(parameters.values()), history=(*robot.history, remark), proof=None)
+        return calibrated.marked(self.data.simulated)
 
     @property
     def simulated_from(self) -> tuple[Marked, ...]:
@@ -557,14 +557,14 @@ class AxisAnalysis:
         return self._frame(self._flange_of)
 
     def _frame(self, place: Any) -> tuple[Transform, float, float]:
-        here = place(self.measured.robot)
+        measured = place(self.measured.robot)
 
         def moved(robot: Robot) -> Array:
-            there = place(robot)
-            return np.concatenate([there[:3, 3], rotation_vector(there[:3, :3] @ here[:3, :3].T)])
+            fitted = place(robot)
+            return np.concatenate([fitted[:3, 3], rotation_vector(fitted[:3, :3] @ measured[:3, :3].T)])
 
         _, deviation = self.measured.derived(moved)
-        transform = Transform.from_matrix(here[:3, :3], here[:3, 3])
+        transform = Transform.from_matrix(measured[:3, :3], measured[:3, 3])
         return transform, float(deviation[:3].max()), float(deviation[3:].max())
 
     def _base_of(self, robot: Robot) -> Array:
@@ -604,13 +604,13 @@ class AxisAnalysis:
             for axis in joint_axes(robot)
         ]
         tip = np.linalg.inv(base) @ flange
-        made = replace(
+        framed = replace(
             robot,
             joints=tuple(replace(joint, row=row, bearing=None) for joint, row in zip(robot.joints, rows, strict=True)),
             flange=Transform.from_matrix(tip[:3, :3], tip[:3, 3]),
             known={},
         )
-        return made.with_frames(Transform.from_matrix(R, origin), {})
+        return framed.with_frames(Transform.from_matrix(R, origin), {})
 
     def table(self, convention_name: str) -> list[dict[str, tuple[float, float]]]:
         """Return the rows of the measured axes in a convention, each number with its deviation [SI].
@@ -621,8 +621,8 @@ class AxisAnalysis:
         columns = [list(joint.row) for joint in converted(self.framed(self.measured.robot), convention_name).joints]
 
         def numbers(robot: Robot) -> Array:
-            made = converted(self.framed(robot), convention_name)
-            return np.array([j.row[c] for j, wanted in zip(made.joints, columns, strict=True) for c in wanted])
+            robot_in = converted(self.framed(robot), convention_name)
+            return np.array([j.row[c] for j, wanted in zip(robot_in.joints, columns, strict=True) for c in wanted])
 
         value, deviation = self.measured.derived(numbers)
         pairs = iter(zip(value.tolist(), deviation.tolist(), strict=True))
@@ -631,17 +631,17 @@ class AxisAnalysis:
     @property
     def notices(self) -> tuple[Notice, ...]:
         """What a person should know."""
-        said = []
+        notices = []
         if self.found.left_out:
-            said.append(
+            notices.append(
                 LEFT_OUT(
                     f"{self.found.left_out} of {self.data.configurations} configurations belong to no run in which one"
                     " joint moves alone, and were not used."
                 )
             )
-        said += [NO_CIRCLE(f"A target was not used in one run. {refusal}") for refusal in self.found.refused]
+        notices += [NO_CIRCLE(f"A target was not used in one run. {refusal}") for refusal in self.found.refused]
         if self.found.excess > 1.0:
-            said.append(
+            notices.append(
                 NOT_CIRCULAR(
                     f"The points are {self.found.excess:.2g} times further from their circles than the declared"
                     " deviations allow. The arm gives way, or something moved. All deviations are widened by that"
@@ -650,14 +650,14 @@ class AxisAnalysis:
             )
         misfit = self.calibrated.residual
         if misfit is not None and misfit > _LARGEST_MISFIT:
-            said.append(
+            notices.append(
                 MISFIT(
                     f"The convention {self.nominal.convention_name} leaves {misfit:.2g} deviations between the robot's"
                     " axes and the measured ones. If axes are parallel, convert the robot to hayati or to joint-errors."
                     " Otherwise the arm does not turn about fixed axes."
                 )
             )
-        return tuple(said)
+        return tuple(notices)
 
 
 def analyse(robot: Robot, data: Dataset, *, in_robot_frame: bool = False) -> AxisAnalysis:
@@ -680,16 +680,16 @@ def analyse(robot: Robot, data: Dataset, *, in_robot_frame: bool = False) -> Axi
             came=f"{data.joints.shape[1]} joints",
             allowed=f"{len(robot.joints)}",
         )
-    found = axis_circles(data)
+    circles = axis_circles(data)
     placed = robot if in_robot_frame else robot.with_frames(initial_frames(robot, data).base, {})
     groups: tuple[Group, ...] = ("geometry",) if in_robot_frame else ("base", "geometry")
     design = converted(placed, "joint-errors")
     return AxisAnalysis(
         nominal=robot,
         data=data,
-        found=found,
-        measured=measured_axes(placed, found.circles),
-        calibrated=fit_axes(placed, found.circles, (*groups, "joint zero")),
-        errors=fit_axes(design, found.circles, groups),
+        found=circles,
+        measured=measured_axes(placed, circles.circles),
+        calibrated=fit_axes(placed, circles.circles, (*groups, "joint zero")),
+        errors=fit_axes(design, circles.circles, groups),
         in_robot_frame=in_robot_frame,
     )

@@ -113,19 +113,19 @@ class AxisCalibration(Record):
 
     def _axes(self) -> list[dict[str, Any]]:
         measured = self.analysis.measured
-        made = []
+        axes = []
         for number, axis in enumerate(joint_axes(measured.robot), 1):
-            mine = [p for p in measured.free.parameters if p.name.endswith(f"_{number}")]
-            made.append(
+            parameters = [p for p in measured.free.parameters if p.name.endswith(f"_{number}")]
+            axes.append(
                 {
                     "joint": number,
                     "direction": axis.along.tolist(),
                     "point_mm": (axis.point * 1e3).tolist(),
-                    "point_deviation_mm": max(p.deviation or 0.0 for p in mine if p.unit == "m") * 1e3,
-                    "direction_deviation_mrad": max(p.deviation or 0.0 for p in mine if p.unit == "rad") * 1e3,
+                    "point_deviation_mm": max(p.deviation or 0.0 for p in parameters if p.unit == "m") * 1e3,
+                    "direction_deviation_mrad": max(p.deviation or 0.0 for p in parameters if p.unit == "rad") * 1e3,
                 }
             )
-        return made
+        return axes
 
     def _table(self, name: str) -> dict[str, Any]:
         nominal = self.analysis.nominal
@@ -161,17 +161,17 @@ def joint_errors(fit: AxisFit) -> Iterator[Block]:
     yield each("unseen", (_unseen(r, moves_flange=r.dropped in fit.moving_flange) for r in fit.redundancies))
 
 
-def _unseen(one: Redundancy, *, moves_flange: bool) -> Words:
-    words = f"  {one.combination}{' (moves the flange)' if moves_flange else ''}"
-    return detail(words, name=one.dropped, combination=one.combination, moves_flange=moves_flange)
+def _unseen(redundancy: Redundancy, *, moves_flange: bool) -> Words:
+    words = f"  {redundancy.combination}{' (moves the flange)' if moves_flange else ''}"
+    return detail(words, name=redundancy.dropped, combination=redundancy.combination, moves_flange=moves_flange)
 
 
 def _joint_error(p: Parameter, words: str) -> Words:
     unit, half = SHOWN_AS[p.unit], NORMAL_95 * (p.deviation or 0.0)
     value, low, high = (from_si(v, unit) for v in (p.value, p.value - half, p.value + half))
     line = f"  {words:<24} {value:9.4f} {unit:<4} {low:9.4f} to {high:.4f}"
-    held = {"value": value, "deviation": from_si(p.deviation or 0.0, unit), "interval": [low, high], "is": words}
-    return say(line, name=p.name, unit=unit, **held)
+    figures = {"value": value, "deviation": from_si(p.deviation or 0.0, unit), "interval": [low, high], "is": words}
+    return say(line, name=p.name, unit=unit, **figures)
 
 
 def _circle(measured: AxisCircle) -> Words:

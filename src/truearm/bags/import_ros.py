@@ -26,9 +26,9 @@ class _Topics(NamedFiles):
         """Refuse what are no topics by name, and one with two names."""
         if not isinstance(value, Mapping):
             raise wrong_kind("topics by name belong here", value, name, "a dict of names and topics")
-        for one, topic in value.items():
-            if not isinstance(one, str) or not isinstance(topic, str):
-                wrong = topic if isinstance(one, str) else one
+        for target, topic in value.items():
+            if not isinstance(target, str) or not isinstance(topic, str):
+                wrong = topic if isinstance(target, str) else target
                 raise wrong_kind("a name and a topic belong here", wrong, name, "texts")
         if len(set(value.values())) < len(value):
             raise InputError("one topic has two names", parameter=name, came=", ".join(value.values()))

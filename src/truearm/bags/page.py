@@ -40,7 +40,7 @@ def bag_html(imported: ImportedBag) -> str:
     ).html(imported)
 
 
-def _picture(found: Recording) -> Figure:
+def _picture(recording: Recording) -> Figure:
     shapes = [
         {
             "type": "rect",
@@ -53,26 +53,26 @@ def _picture(found: Recording) -> Figure:
             "line": {"width": 0},
             "layer": "below",
         }
-        for still in found.standstills
+        for still in recording.standstills
     ]
-    stream = found.joints
-    prismatic = np.array([kind == "prismatic" for kind in found.data.joint_kinds])
+    stream = recording.joints
+    prismatic = np.array([kind == "prismatic" for kind in recording.data.joint_kinds])
     shown = np.where(prismatic, 1e3 * stream.positions, np.degrees(stream.positions))
     moves = [
-        line(name, stream.times[kept], shown[kept, joint] - shown[0, joint], HUES[joint % len(HUES)], 1.2)
-        for kept in (_thin(len(stream.times)),)
+        line(name, stream.times[chosen], shown[chosen, joint] - shown[0, joint], HUES[joint % len(HUES)], 1.2)
+        for chosen in (_thin(len(stream.times)),)
         for joint, name in enumerate(stream.names)
     ]
     unit = "[deg or mm]" if prismatic.any() else "[deg]"
     title = f"Joints ({html.escape(stream.topic)}), from their first positions"
     drawn = [Panel(title, moves, "time [s]", unit, shapes=shapes)]
-    for target in found.targets:
-        kept = _thin(len(target.times))
+    for target in recording.targets:
+        rows = _thin(len(target.times))
         away: Array = np.linalg.norm(target.positions - target.positions[0], axis=1) * 1e3
         drawn.append(
             Panel(
                 f"{html.escape(target.target)} ({html.escape(target.topic)}), from where it was first",
-                [line("", target.times[kept], away[kept], HUES[0], 1.2)],
+                [line("", target.times[rows], away[rows], HUES[0], 1.2)],
                 "time [s]",
                 "distance [mm]",
                 shapes=shapes,
@@ -85,7 +85,7 @@ def _thin(count: int) -> Array:
     return np.unique(np.linspace(0, count - 1, min(count, _MOST)).round().astype(np.intp))
 
 
-def _table(found: Recording) -> Section:
+def _table(recording: Recording) -> Section:
     heading = (
         "configuration",
         "from [s]",
@@ -98,7 +98,7 @@ def _table(found: Recording) -> Section:
     )
     rows = [
         (
-            found.data.labels[number - 1],
+            recording.data.labels[number - 1],
             f"{still.start:.2f}",
             f"{still.end:.2f}",
             target.target,
@@ -109,7 +109,7 @@ def _table(found: Recording) -> Section:
                 for value in (row[number - 1].scatter, row[number - 1].sigma)
             ),
         )
-        for number, still in enumerate(found.standstills, 1)
-        for target, row in zip(found.targets, found.sightings, strict=True)
+        for number, still in enumerate(recording.standstills, 1)
+        for target, row in zip(recording.targets, recording.sightings, strict=True)
     ]
     return tabled("Standstills", heading, tuple(rows))

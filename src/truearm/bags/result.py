@@ -56,12 +56,12 @@ class ImportedBag(Record):
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """What to know about the recording."""
-        lost, kept = self.found.lost, len(self.found.joints.times)
-        if lost < _LOST * (lost + kept):
+        lost, received = self.found.lost, len(self.found.joints.times)
+        if lost < _LOST * (lost + received):
             return ()
         return (
             MESSAGES_MISSING(
-                f"About {lost} of {lost + kept} messages of the joints are missing, by the times of the others. "
+                f"About {lost} of {lost + received} messages of the joints are missing, by the times of the others. "
                 "Motions shorter than the gaps are not seen."
             ),
         )
@@ -77,7 +77,7 @@ class ImportedBag(Record):
             joint_names=list(recording.joints.names),
             standstills_s=[[still.start, still.end] for still in recording.standstills],
         )
-        yield each("targets", (_of_target(*one) for one in zip(recording.targets, recording.sightings, strict=True)))
+        yield each("targets", (_of_target(*pair) for pair in zip(recording.targets, recording.sightings, strict=True)))
         text = []
         if recording.missed:
             when = listed([f"{at:.1f} s" for at in recording.missed])
@@ -113,21 +113,21 @@ def _of_target(target: TargetStream, row: tuple[Sighting, ...]) -> Iterator[Bloc
     """Give what was seen of a target in each standstill."""
     from truearm.engine.document.drawing import significant
 
-    there = [one for one in row if math.isfinite(one.scatter)]
-    samples = sorted(one.samples for one in there)
-    scatter = 1e3 * float(np.median([one.scatter for one in there]))
+    seen = [sighting for sighting in row if math.isfinite(sighting.scatter)]
+    samples = sorted(sighting.samples for sighting in seen)
+    scatter = 1e3 * float(np.median([sighting.scatter for sighting in seen]))
     yield say(
         f"  {target.target}: {samples[0]} to {samples[-1]} samples a standstill, scattered by "
         f"{significant(scatter, 2)} mm, in frame {target.frame or '(none)'}",
         name=target.target,
         topic=target.topic,
         frame=target.frame,
-        samples=[one.samples for one in row],
-        scatter_mm=[_number(1e3 * one.scatter) for one in row],
-        sigma_mm=[_number(1e3 * one.sigma) for one in row],
+        samples=[sighting.samples for sighting in row],
+        scatter_mm=[_number(1e3 * sighting.scatter) for sighting in row],
+        sigma_mm=[_number(1e3 * sighting.sigma) for sighting in row],
     )
-    missing = sum(not np.isfinite(one.position).all() for one in row)
-    aside = sum(one.set_aside for one in row)
+    missing = sum(not np.isfinite(sighting.position).all() for sighting in row)
+    aside = sum(sighting.set_aside for sighting in row)
     for key, count, words in (
         ("missing", missing, f"not seen in {counted(missing, 'standstill')}"),
         ("set_aside", aside, f"{counted(aside, 'sample')} set aside, far from the others of their standstill"),
@@ -145,7 +145,7 @@ def of_bag(asked: ImportRos) -> ImportedBag:
     bag = path_argument(asked.file, "file")
     out = None if asked.out is None else _table_for(asked.out, bag)
     with refusals_of("file"):
-        recording = _found(bag, asked)
+        recording = _recording_of(bag, asked)
     imported = ImportedBag(recording, asked.again, files_of(bag))
     if out is not None:
         asked.progress("writing the files")
@@ -162,7 +162,7 @@ def _table_for(out: str | Path, bag: Path) -> Path:
     return table
 
 
-def _found(bag: Path, asked: ImportRos) -> Recording:
+def _recording_of(bag: Path, asked: ImportRos) -> Recording:
     """Return the standstills in a bag, and what was seen in them."""
     references = asked.references or {}
     asked.progress("reading the bag")

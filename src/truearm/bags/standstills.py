@@ -87,12 +87,12 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
         InputError: If there is none, or the joints creep.
     """
     times, positions = stream.times, stream.positions
-    where = f"topic {stream.topic}"
+    place = f"topic {stream.topic}"
     usual = _usual_step(times)
     if usual <= 0.0 or times[-1] < hold:
         raise InputError(
             "the joints were recorded for too short a time",
-            where=where,
+            where=place,
             came=f"{len(times)} samples in {times[-1]:.3g} s",
             allowed=f"{hold:g} s and more",
         )
@@ -101,7 +101,7 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
     last = np.maximum(last, first + 2)[last < len(times)]
     last = last[last < len(times)]
     if not len(last):
-        raise InputError("there are too few samples of the joints", where=where, came=f"{len(times)}")
+        raise InputError("there are too few samples of the joints", where=place, came=f"{len(times)}")
     first = first[: len(last)]
     spans = _spans(positions, last)
     gaps = np.concatenate([[0], np.cumsum(np.diff(times) > _longest_gap(usual))])
@@ -113,7 +113,7 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
         raise InputError(
             "the robot never stands still",
             parameter="still",
-            where=where,
+            where=place,
             came=f"no joint moves more than {least:.3g} deg in the quietest {hold:g} s"
             if whole.any()
             else f"no {hold:g} s without a gap",
@@ -121,7 +121,7 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
             cure="Let the robot wait at each configuration, or allow more with `still` or a shorter time with "
             "`shortest_dwell` if that was a standstill.",
         )
-    found = []
+    standstills = []
     for i, j in _joined(positions, gaps, zip(begin.tolist(), (last[end - 1] + 1).tolist(), strict=True), still):
         part = positions[i:j]
         span = float(np.ptp(part, axis=0).max())
@@ -129,13 +129,13 @@ def find_standstills(stream: JointStream, still: float, hold: float) -> tuple[St
             raise InputError(
                 "the joints creep instead of standing still",
                 parameter="still",
-                where=f"{where}, {times[i]:.1f} s to {times[j - 1]:.1f} s after its first message",
+                where=f"{place}, {times[i]:.1f} s to {times[j - 1]:.1f} s after its first message",
                 came=f"a joint moves {math.degrees(span):.3g} deg in all, {math.degrees(still):g} deg at most in "
                 f"{hold:g} s",
                 cure="Record stops, not slow motion; a smaller `still` tells them apart.",
             )
-        found.append(Standstill(float(times[i]), float(times[j - 1]), part.mean(axis=0), span))
-    return tuple(found)
+        standstills.append(Standstill(float(times[i]), float(times[j - 1]), part.mean(axis=0), span))
+    return tuple(standstills)
 
 
 def _spans(positions: Array, last: IntArray) -> Array:
@@ -147,10 +147,10 @@ def _spans(positions: Array, last: IntArray) -> Array:
     level = np.frexp(length)[1] - 1
     spans, low, high = np.zeros(len(last)), positions, positions
     for power in range(int(level.max()) + 1):
-        mine = np.flatnonzero(level == power)
-        other = last[mine] - (1 << power) + 1
-        reach = np.maximum(high[mine], high[other]) - np.minimum(low[mine], low[other])
-        spans[mine] = reach.max(axis=1)
+        rows = np.flatnonzero(level == power)
+        other = last[rows] - (1 << power) + 1
+        reach = np.maximum(high[rows], high[other]) - np.minimum(low[rows], low[other])
+        spans[rows] = reach.max(axis=1)
         low, high = (
             extreme(ends[: -(1 << power)], ends[1 << power :])
             for extreme, ends in ((np.minimum, low), (np.maximum, high))
@@ -164,17 +164,17 @@ def _joined(positions: Array, gaps: IntArray, parts: Iterable[tuple[int, int]], 
     Args:
         gaps: How many long gaps there are before each sample, ``(n,)``.
     """
-    found: list[tuple[int, int]] = []
+    joined: list[tuple[int, int]] = []
     for i, j in parts:
-        if found and gaps[found[-1][1] - 1] == gaps[i]:
-            before = found[-1]
+        if joined and gaps[joined[-1][1] - 1] == gaps[i]:
+            before = joined[-1]
             means = [positions[a:b].mean(axis=0) for a, b in (before, (i, j))]
             between = np.concatenate([means, positions[before[1] : i]])
             if float(np.ptp(between, axis=0).max()) <= still:
-                found[-1] = (before[0], max(j, before[1]))
+                joined[-1] = (before[0], max(j, before[1]))
                 continue
-        found.append((i, j))
-    return found
+        joined.append((i, j))
+    return joined
 
 
 def _usual_step(times: Array) -> float:
@@ -244,11 +244,11 @@ def seen_at(stills: Sequence[Standstill], stream: TargetStream, settle: float) -
     for still in stills:
         inside = (stream.times >= still.start + settle) & (stream.times <= still.end - settle)
         positions = stream.positions[inside]
-        kept = np.ones(len(positions), dtype=bool)
+        near = np.ones(len(positions), dtype=bool)
         if len(positions) >= _LEAST_SAMPLES:
             distance = np.linalg.norm(positions - np.median(positions, axis=0), axis=1)
-            kept = distance <= max(_FAR * float(np.median(distance)), _NEAR)
-        parts.append((positions[kept], None if stream.quaternions is None else stream.quaternions[inside][kept], ~kept))
+            near = distance <= max(_FAR * float(np.median(distance)), _NEAR)
+        parts.append((positions[near], None if stream.quaternions is None else stream.quaternions[inside][near], ~near))
     _refuse_motion(stills, stream, parts)
     slow = _correlation_time([part for part, _, _ in parts if len(part) >= _LEAST_SAMPLES])
     return tuple(_mean(part, turns, int(far.sum()), slow) for part, turns, far in parts)
@@ -277,25 +277,25 @@ def _refuse_motion(
         moved = at_ends > max(_MOVED, 1.5 / len(far)) or (moves > _STANDS and scatter > _MOVES * moves)
         if not moved and float(far.mean()) <= max(_SET_ASIDE, 1.5 / len(far)):
             continue
-        where = (
+        place = (
             f"topic {stream.topic}, standstill {number + 1}, {stills[number].start:.2f} s to "
             f"{stills[number].end:.2f} s after the first message of the joints"
         )
-        came = f"{100 * far.mean():.0f} % of the samples far from the others, which are scattered by "
-        came += f"{1e3 * scatter:.3g} mm"
+        outlying = f"{100 * far.mean():.0f} % of the samples far from the others, which are scattered by "
+        outlying += f"{1e3 * scatter:.3g} mm"
         if not moved:
             raise InputError(
                 "too many samples of a standstill are outlying",
-                where=where,
-                came=came,
+                where=place,
+                came=outlying,
                 allowed=f"{100 * _SET_ASIDE:.0f} %",
                 cure="See what the instrument took for the target, and record that configuration again.",
             )
         raise InputError(
             "the target moves while the joints stand still",
             parameter="times",
-            where=where,
-            came=came,
+            where=place,
+            came=outlying,
             cure="If the clocks of the two topics differ, take the recorder's times: `times=bag`. If the arm "
             "still shakes, leave out more of each standstill (`settle`). Record it again if somebody "
             "touched the target.",
@@ -406,9 +406,9 @@ def found_in(
         for place in range(len(stills))
         for target, row in zip(targets, sightings, strict=True)
     ]
-    seen = [one for _, _, one in rows]
-    exact = any(one.sigma < _EXACT or (one.sigma_rot or _EXACT) < _EXACT for one in seen)
-    turned = any(one.quaternion is not None for one in seen)
+    seen = [sighting for _, _, sighting in rows]
+    exact = any(sighting.sigma < _EXACT or (sighting.sigma_rot or _EXACT) < _EXACT for sighting in seen)
+    turned = any(sighting.quaternion is not None for sighting in seen)
     nothing = np.full(4, np.nan)
     readings = Readings(
         source=str(bag),
@@ -416,12 +416,12 @@ def found_in(
         configuration=np.array([place for place, _, _ in rows], dtype=np.intp),
         targets=[target.target for _, target, _ in rows],
         reference=np.array([target.target in references for _, target, _ in rows]),
-        position=np.array([one.position for one in seen]),
-        quaternion=np.array([nothing if one.quaternion is None else one.quaternion for one in seen])
+        position=np.array([sighting.position for sighting in seen]),
+        quaternion=np.array([nothing if sighting.quaternion is None else sighting.quaternion for sighting in seen])
         if turned
         else None,
-        sigma=None if exact else np.array([one.sigma for one in seen]),
-        sigma_rot=np.array([np.nan if one.sigma_rot is None else one.sigma_rot for one in seen])
+        sigma=None if exact else np.array([sighting.sigma for sighting in seen]),
+        sigma_rot=np.array([np.nan if sighting.sigma_rot is None else sighting.sigma_rot for sighting in seen])
         if turned and not exact
         else None,
     )

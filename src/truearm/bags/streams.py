@@ -105,11 +105,11 @@ def _opened(bag: Path) -> Iterator[Any]:
     except InputError:
         raise
     except Exception as error:  # of a damaged bag the library lets out errors of any kind
-        said = " ".join(str(error).split())[:200] or type(error).__name__
+        message = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(
             "the bag cannot be read",
             where=str(bag),
-            came="a text that is no UTF-8" if "codec can't decode" in said else said,
+            came="a text that is no UTF-8" if "codec can't decode" in message else message,
             cure="Fix it with the tools of ROS ('rosbag reindex', 'ros2 bag reindex'), or record it again.",
         ) from error
 
@@ -140,10 +140,10 @@ def _refuse_no_bag(bag: Path) -> None:
 
 
 def _joint_topic(bag: Path, kinds: Mapping[str, str], wanted: str | None) -> str:
-    found = [topic for topic, kind in kinds.items() if kind == JOINTS]
+    topics = [topic for topic, kind in kinds.items() if kind == JOINTS]
     if wanted is not None:
-        return _of_kind(bag, kinds, wanted, (JOINTS,), "joint_topic", found)
-    if not found:
+        return _of_kind(bag, kinds, wanted, (JOINTS,), "joint_topic", topics)
+    if not topics:
         raise InputError(
             "the bag has no joint positions",
             where=str(bag),
@@ -151,22 +151,22 @@ def _joint_topic(bag: Path, kinds: Mapping[str, str], wanted: str | None) -> str
             allowed=f"a topic of {_ros_name(JOINTS)}",
             cure="Record the joint states along with the poses: /joint_states in most cells.",
         )
-    if len(found) > 1:
+    if len(topics) > 1:
         raise InputError(
             "several topics hold joint positions",
             parameter="joint_topic",
             where=str(bag),
-            came=listed(found),
+            came=listed(topics),
             cure="Say with `joint_topic` which of them is what the robot measured, not what it was commanded.",
         )
-    return found[0]
+    return topics[0]
 
 
 def _target_topics(bag: Path, kinds: Mapping[str, str], wanted: Mapping[str, str] | None) -> dict[str, str]:
-    found = [topic for topic, kind in kinds.items() if kind in SEEN]
+    topics = [topic for topic, kind in kinds.items() if kind in SEEN]
     if wanted:
-        return {name: _of_kind(bag, kinds, topic, tuple(SEEN), "targets", found) for name, topic in wanted.items()}
-    if not found:
+        return {name: _of_kind(bag, kinds, topic, tuple(SEEN), "targets", topics) for name, topic in wanted.items()}
+    if not topics:
         raise InputError(
             "the bag has no topic with points or poses of a target",
             where=str(bag),
@@ -174,29 +174,29 @@ def _target_topics(bag: Path, kinds: Mapping[str, str], wanted: Mapping[str, str
             allowed=listed([_ros_name(kind) for kind in SEEN]),
             cure="Record what the instrument or camera publishes, in one of these kinds with a header.",
         )
-    if len(found) > 1:
+    if len(topics) > 1:
         raise InputError(
             "several topics hold points or poses",
             parameter="targets",
             where=str(bag),
-            came=listed(found),
+            came=listed(topics),
             cure="Name with `targets` each one that an instrument measured. A pose that the controller "
             "computes from its joints is no measurement.",
         )
-    return {found[0].strip("/"): found[0]}
+    return {topics[0].strip("/"): topics[0]}
 
 
 def _of_kind(
-    bag: Path, kinds: Mapping[str, str], topic: str, allowed: tuple[str, ...], parameter: str, found: Sequence[str]
+    bag: Path, kinds: Mapping[str, str], topic: str, allowed: tuple[str, ...], parameter: str, topics: Sequence[str]
 ) -> str:
     if topic not in kinds:
-        near = nearest_names(topic, found)
+        near = nearest_names(topic, topics)
         raise InputError(
             "the bag has no such topic",
             parameter=parameter,
             where=str(bag),
             came=topic,
-            allowed=listed(found) if found else None,
+            allowed=listed(topics) if topics else None,
             cure=f"Did you mean {' or '.join(near)}?" if near else None,
         )
     if kinds[topic] not in allowed:
@@ -255,21 +255,21 @@ def _read_joints(bag: Path, reader: Any, topic: str, wanted: Sequence[str] | Non
     places: dict[tuple[str, ...], list[int]] = {}
     heard: dict[str, None] = {}
     for time, message in _messages(bag, reader, topic, times):
-        told = tuple(message.name)
-        if told not in places:
-            heard |= dict.fromkeys(told)
-            names = names or _in_order(bag, topic, told)
-            places[told] = [told.index(name) for name in names] if set(names) <= set(told) else []
-        if not places[told]:  # of a gripper, say
+        named = tuple(message.name)
+        if named not in places:
+            heard |= dict.fromkeys(named)
+            names = names or _in_order(bag, topic, named)
+            places[named] = [named.index(name) for name in names] if set(names) <= set(named) else []
+        if not places[named]:  # of a gripper, say
             continue
-        if len(message.position) != len(told):
+        if len(message.position) != len(named):
             raise InputError(
                 "a message has another number of positions than of names",
                 where=f"{bag}, topic {topic}",
-                came=f"{len(message.position)} positions of {len(told)} joints",
+                came=f"{len(message.position)} positions of {len(named)} joints",
             )
         at.append(time)
-        values.extend(float(message.position[place]) for place in places[told])
+        values.extend(float(message.position[place]) for place in places[named])
     if not at:
         raise InputError(
             "no message holds all of these joints" if heard else "the topic of the joints has no message",
@@ -289,18 +289,18 @@ def _read_joints(bag: Path, reader: Any, topic: str, wanted: Sequence[str] | Non
     return JointStream(topic, names, np.asarray(np.frombuffer(at, np.int64) - at[0], float) * 1e-9, positions, at[0])
 
 
-def _in_order(bag: Path, topic: str, told: tuple[str, ...]) -> tuple[str, ...]:
+def _in_order(bag: Path, topic: str, named: tuple[str, ...]) -> tuple[str, ...]:
     """Return the joints in the order of the numbers at their ends; the order in a message means nothing."""
-    found = [_NUMBERED.fullmatch(name) for name in told]
-    numbers = {int(match["number"]): match[0] for match in found if match is not None}
-    stems = {match["stem"] for match in found if match is not None}
+    matches = [_NUMBERED.fullmatch(name) for name in named]
+    numbers = {int(match["number"]): match[0] for match in matches if match is not None}
+    stems = {match["stem"] for match in matches if match is not None}
     first = min(numbers, default=1)
-    if None in found or len(stems) != 1 or len(numbers) != len(told) or max(numbers) - first + 1 != len(told):
+    if None in matches or len(stems) != 1 or len(numbers) != len(named) or max(numbers) - first + 1 != len(named):
         raise InputError(
             "the joints' names do not tell their order",
             parameter="joint_names",
             where=f"{bag}, topic {topic}",
-            came=listed(told),
+            came=listed(named),
             cure="Name the robot's joints from base to flange with `joint_names`; others are not read. The order in a "
             "message means nothing: many drivers sort by the alphabet.",
         )
@@ -317,20 +317,20 @@ def _read_target(bag: Path, reader: Any, target: str, topic: str, kind: str, tim
         frames.setdefault(f"{message.header.frame_id}".strip() + _child(message))
         at.append(time)
         values.extend(part(message))
-    where = f"{bag}, topic {topic}"
+    place = f"{bag}, topic {topic}"
     if not at:
-        raise InputError("the topic has no message", where=where)
+        raise InputError("the topic has no message", where=place)
     if len(frames) > 1:
         raise InputError(
             "the messages are of several frames",
-            where=where,
+            where=place,
             came=listed([repr(name) for name in frames]),
             allowed="one frame, that of the instrument, which stands still",
         )
     numbers = np.frombuffer(values).reshape(len(at), -1)
     seconds = np.asarray(np.frombuffer(at, np.int64) - start, float) * 1e-9
     whole = np.isfinite(numbers).all(axis=1)
-    quaternions = _unit(numbers[whole, 3:], where) if turned else None
+    quaternions = _unit(numbers[whole, 3:], place) if turned else None
     frame = next(iter(frames))
     return TargetStream(
         target, topic, seconds[whole], numbers[whole, :3].copy(), quaternions, frame, int((~whole).sum())
@@ -341,7 +341,7 @@ def _part_of(kind: str) -> Callable[[Any], tuple[float, ...]]:
     """Return what finds position and quaternion (w, x, y, z) in a message of a kind."""
     path = SEEN[kind]
 
-    def found(message: Any) -> tuple[float, ...]:
+    def pose_of(message: Any) -> tuple[float, ...]:
         for name in path:
             message = getattr(message, name)
         if kind == "geometry_msgs/msg/PointStamped":
@@ -353,7 +353,7 @@ def _part_of(kind: str) -> Callable[[Any], tuple[float, ...]]:
         )
         return place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z
 
-    return found
+    return pose_of
 
 
 def _child(message: Any) -> str:
@@ -361,13 +361,13 @@ def _child(message: Any) -> str:
     return f" to {child}" if child else ""
 
 
-def _unit(quaternions: Array, where: str) -> Array:
+def _unit(quaternions: Array, place: str) -> Array:
     length = np.linalg.norm(quaternions, axis=1)
     bad = np.abs(length - 1.0) > 1e-3
     if bad.any():
         raise InputError(
             "a quaternion does not have length 1",
-            where=where,
+            where=place,
             came=f"length {length[bad][0]:.6g}",
             allowed="1 within 0.001",
             cure="Publish a point where the instrument measures no orientation.",

@@ -249,8 +249,8 @@ def _corners(cv2: Any, image: Any, board: Charuco, path: Path) -> Seen:
     names = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{board.dictionary}"))
 
     def detected(columns: int, rows: int) -> tuple[Any, Any, int, int]:
-        made = cv2.aruco.CharucoBoard((columns, rows), board.square, board.marker, names)
-        corners, numbers, _, markers = cv2.aruco.CharucoDetector(made).detectBoard(image)
+        charuco = cv2.aruco.CharucoBoard((columns, rows), board.square, board.marker, names)
+        corners, numbers, _, markers = cv2.aruco.CharucoDetector(charuco).detectBoard(image)
         return corners, numbers, 0 if numbers is None else len(numbers), 0 if markers is None else len(markers)
 
     corners, numbers, count, many = detected(board.columns, board.rows)

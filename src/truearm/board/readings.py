@@ -109,15 +109,15 @@ def read_hand_eye(
 
 
 def _poses(cells: Cells, columns: Columns) -> Views:
-    there = [name for name in _DEVIATIONS if name in columns]
-    if len(there) == 1:
-        missing = next(name for name in _DEVIATIONS if name not in there)
+    stated = [name for name in _DEVIATIONS if name in columns]
+    if len(stated) == 1:
+        missing = next(name for name in _DEVIATIONS if name not in stated)
         raise InputError(
             f"the column {missing} is missing",
             where=f"{cells.source}, line {cells.header}",
-            came=there[0],
+            came=stated[0],
             allowed="sigma and sigma_rot, or none of them",
-            cure=f"Add {_OF_POSES[missing]}, or leave {there[0]} out.",
+            cure=f"Add {_OF_POSES[missing]}, or leave {stated[0]} out.",
         )
     position = np.column_stack([cells.numbers(*columns[axis]) for axis in _POSITION])
     parts = np.column_stack([cells.numbers(*columns[part]) for part in _QUATERNION])
@@ -131,24 +131,24 @@ def _poses(cells: Cells, columns: Columns) -> Views:
             allowed="above 0: z points from the camera to what it sees",
             cure="Give poses of the board in the camera, T_camera_board, and not of the camera in the board.",
         )
-    deviations = [cells.numbers(*columns[name], deviation=True) for name in there]
+    deviations = [cells.numbers(*columns[name], deviation=True) for name in stated]
     return of_deviations(rotation, position, *(deviations or (None, None)))
 
 
-def _dataset(source: str, found: Configurations, target: str) -> Dataset:
+def _dataset(source: str, configurations: Configurations, target: str) -> Dataset:
     """Return the configurations, and a reading of one target at each, still empty."""
-    n = len(found.labels)
+    n = len(configurations.labels)
     empty = Dataset(
         source=source,
-        labels=found.labels,
-        joints=found.joints,
-        joint_kinds=found.kinds,
-        joints_are=found.joints_are,
+        labels=configurations.labels,
+        joints=configurations.joints,
+        joint_kinds=configurations.kinds,
+        joints_are=configurations.joints_are,
         targets=(target,),
         configuration=np.arange(n),
         target=np.zeros(n, dtype=np.intp),
         position=np.full((n, 3), np.nan),
-        simulated=found.simulated,
+        simulated=configurations.simulated,
     )
     return in_order(empty)
 
@@ -196,10 +196,10 @@ class ImportedHandEye(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give what was read, in mm, mrad, ppm and pixels."""
-        data, where = self.data, "" if self.out is None else f": {self.out}"
-        mm, mrad = (None if one is None else 1e3 * one for one in (self.sigma, self.sigma_rot))
+        data, destination = self.data, "" if self.out is None else f": {self.out}"
+        mm, mrad = (None if deviation is None else 1e3 * deviation for deviation in (self.sigma, self.sigma_rot))
         yield say(
-            f"{counted(data.configurations, 'configuration')}, target {data.targets[0]}{where}",
+            f"{counted(data.configurations, 'configuration')}, target {data.targets[0]}{destination}",
             configurations=data.configurations,
             on_flange=self.on_flange,
             ahead_mm=1e3 * self.ahead,
@@ -224,8 +224,8 @@ class ImportedHandEye(Record):
             digits = 1 if unit else 4
             of = [f"{n} {values[n]:.{digits}f} ({deviations[n]:.{digits}f})" for n in names]
             text.append(f"  lens: {', '.join(of)}{unit}")
-        held = {"values": dict(values), "deviations": dict(deviations)}
-        return detail(*text, lens={**held, "noise_px": lens.noise, "corners": list(lens.corners)})
+        figures = {"values": dict(values), "deviations": dict(deviations)}
+        return detail(*text, lens={**figures, "noise_px": lens.noise, "corners": list(lens.corners)})
 
 
 def of_views(asked: ImportHandEye) -> ImportedHandEye:

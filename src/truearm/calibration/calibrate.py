@@ -135,8 +135,8 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
             )
         if self.monte_carlo is not None:
             self._check_simulated()
-        for given, name in ((self.monte_carlo, "monte_carlo"), (self.zones, "zones")):
-            if given is not None and self.hold:
+        for value, name in ((self.monte_carlo, "monte_carlo"), (self.zones, "zones")):
+            if value is not None and self.hold:
                 raise InputError(
                     "this is not made with places that are held",
                     parameter=name,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, Self, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.calibration.holding import held_argument
+from truearm.calibration.holding import fixed_places_argument
 from truearm.calibration.result import RESULT_FILES, Calibration
 from truearm.calibration.zones import WantedZones, choose_zones, zone_file_names, zones_argument
 from truearm.engine.base.errors import InputError, Notice, Rule, listed, refusals_of
@@ -50,8 +50,8 @@ from truearm.engine.diagnose.base_changes import checked_parts, with_one_base
 from truearm.engine.diagnose.case import DOUBTED, PULLED, Case
 from truearm.engine.diagnose.data_check import notices_of
 from truearm.engine.diagnose.diagnosis import diagnose
+from truearm.engine.diagnose.fixed_places import check_fixed_places
 from truearm.engine.diagnose.gain import check_gain
-from truearm.engine.diagnose.held_places import check_held
 from truearm.engine.diagnose.simulated_calibrations import (
     SimulatedCalibrations,
     check_linear,
@@ -60,7 +60,7 @@ from truearm.engine.diagnose.simulated_calibrations import (
 )
 from truearm.engine.fit.bounds import Bounds, read_bounds
 from truearm.engine.fit.fit import Fit, Status, identify, place
-from truearm.engine.fit.held import Held
+from truearm.engine.fit.fixed_places import FixedPlaces
 from truearm.engine.fit.likelihood import WhitenedProblem
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import FRAMES, Model, named_model
@@ -94,9 +94,9 @@ class FitStep(str):
     @classmethod
     def of(cls, number: int, cost: float, error: float, judges: str) -> Self:
         """Return the words of a step."""
-        made = cls(f"step {number}: cost {cost:.4g}, {judges} error {error * 1e3:.3f} mm")
-        made.number, made.cost, made.error = number, cost, error
-        return made
+        step = cls(f"step {number}: cost {cost:.4g}, {judges} error {error * 1e3:.3f} mm")
+        step.number, step.cost, step.error = number, cost, error
+        return step
 
 
 @contextmanager
@@ -109,7 +109,7 @@ def followed(progress: Callable[[str], None], judging: Dataset, *, held_out: boo
     """
     number, spent, start = 0, 0.0, time.process_time()
 
-    def told(problem: object, vector: Array, cost: float) -> None:
+    def report(problem: object, vector: Array, cost: float) -> None:
         nonlocal number, spent
         number += 1
         began = time.process_time()
@@ -129,7 +129,7 @@ def followed(progress: Callable[[str], None], judging: Dataset, *, held_out: boo
             progress(FitStep.of(number, cost, spread.mean, "held-out" if held_out else "training"))
         spent += time.process_time() - began
 
-    with watching(told):
+    with watching(report):
         yield
 
 
@@ -166,13 +166,13 @@ def simulate_calibrations(
             )
         ]
 
-    def done(count: int) -> None:
+    def report(count: int) -> None:
         full = _BAR * count // trials
         progress(f"simulating calibrations [{'#' * full}{'.' * (_BAR - full)}] {count} of {trials}")
 
     judged = training if held_out is None else held_out
-    found = simulated_calibrations(fit, training, judged, trials, priors=priors, seed=seed, progress=done)
-    return found, check_linear(fit, found)
+    simulated = simulated_calibrations(fit, training, judged, trials, priors=priors, seed=seed, progress=report)
+    return simulated, check_linear(fit, simulated)
 
 
 #: The step at which everything that was given has been read and found usable.
@@ -181,7 +181,7 @@ ACCEPTED: Final = "checking the data"
 MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *EVERY_MODEL)} | {AUTO: None}
 
 
-class _How(TypedDict):
+class _FitOptions(TypedDict):
     """How parameters are identified, whatever is held."""
 
     loss: Loss
@@ -199,8 +199,8 @@ class _Read:
     readings: Dataset  #: Those that count.
     sha256: str | None  #: Of their file.
     excluded: tuple[Excluded, ...]
-    held: Held
-    how: _How
+    fixed: FixedPlaces
+    options: _FitOptions
     zones: WantedZones | None
 
 
@@ -224,7 +224,7 @@ class _Parts:
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
+class _Identified:
     """What was identified."""
 
     robot: Robot  #: The nominal one, with the effects of the chosen model.
@@ -244,11 +244,11 @@ def calibrated(asked: Calibrate) -> Calibration:
     inputs = files_of(*files)
     if asked.out is not None:
         folder_for((*RESULT_FILES, *zone_file_names(zones)), asked.out, *files, ours=True)
-    given = _read(asked, zones)
+    read = _read(asked, zones)
     with refusals_of("data"):
-        parts = _split(asked, given)
-        found = _identified(asked, given, parts)
-    calibration = replace(_judged(asked, given, parts, found), inputs=inputs)
+        parts = _split(asked, read)
+        solved = _identified(asked, read, parts)
+    calibration = replace(_judged(asked, read, parts, solved), inputs=inputs)
     if asked.out is not None:
         calibration.save(asked.out, asked.progress, replace=asked.replace)
     return calibration
@@ -272,23 +272,23 @@ def _read(asked: Calibrate, zones: WantedZones | None) -> _Read:
         sha256 = hash_of(read_bytes(path_argument(asked.data, "data")))
     readings, excluded = without_excluded(as_read, asked.exclude)
     readings = left_out(readings, asked.without)
-    held = held_argument(asked.hold, asked.frames, robot, readings)
+    fixed = fixed_places_argument(asked.hold, asked.frames, robot, readings)
     bounds, bounds_file = asked.bounds, "bounds"
     if bounds is not None and not isinstance(bounds, Bounds):
         bounds_file = str(bounds)
         with refusals_of("bounds"):
             bounds = read_bounds(path_argument(bounds, "bounds"))
-    how = _How(loss=asked.loss, redundancy=asked.redundancy, bounds=bounds, bounds_file=bounds_file)
-    return _Read(robot, urdf, model, as_read, readings, sha256, tuple(excluded), held, how, zones)
+    options = _FitOptions(loss=asked.loss, redundancy=asked.redundancy, bounds=bounds, bounds_file=bounds_file)
+    return _Read(robot, urdf, model, as_read, readings, sha256, tuple(excluded), fixed, options, zones)
 
 
-def _split(asked: Calibrate, given: _Read) -> _Parts:
+def _split(asked: Calibrate, read: _Read) -> _Parts:
     """Check the data, and part them into what is trained on and what judges."""
-    readings = given.readings
+    readings = read.readings
     count = train_count(asked.train, readings.configurations, readings.source)
     order = np.random.default_rng(asked.seed).permutation(readings.configurations)
     training, held_out = order[:count], order[count:]
-    excluded = in_parts(given.excluded, readings, held_out)
+    excluded = in_parts(read.excluded, readings, held_out)
     if not readings.has_reading.any():
         raise InputError(
             "there is no reading", parameter="data", where=readings.source, cure="Fill in x, y and z, or distance."
@@ -306,32 +306,32 @@ def _split(asked: Calibrate, given: _Read) -> _Parts:
     if asked.base_changes:
         asked.progress("finding how the base moved")
         steady, moved = with_one_base(
-            given.robot, steady, training, asked.base_changes, given.model or GEOMETRIC, asked.loss, given.held
+            read.robot, steady, training, asked.base_changes, read.model or GEOMETRIC, asked.loss, read.fixed
         )
-    noticed = notices_of(readings, given.robot, steady=steady, excluded=count_excluded(excluded))
+    noticed = notices_of(readings, read.robot, steady=steady, excluded=count_excluded(excluded))
     first = steady.of_configurations(training)
     second = steady.of_configurations(held_out) if len(held_out) else None
     return _Parts(steady, training, held_out, first, second, tuple(excluded), tuple(noticed), tuple(moved))
 
 
-def _identified(asked: Calibrate, given: _Read, parts: _Parts) -> _Found:
+def _identified(asked: Calibrate, read: _Read, parts: _Parts) -> _Identified:
     """Identify the robot from the training part."""
     asked.progress("placing the nominal robot")
-    robot, first = given.robot, parts.first
-    placed = place(robot, first, asked.loss, given.held)
+    robot, first = read.robot, parts.first
+    placed = place(robot, first, asked.loss, read.fixed)
     if asked.monte_carlo is not None:
-        refuse_too_many(placed, first, given.model or GEOMETRIC)
+        refuse_too_many(placed, first, read.model or GEOMETRIC)
     selection, compared, notices = None, first, list[Notice]()
-    if given.model is None:
+    if read.model is None:
         compared = compared_with(robot, first)
-        selection = select(robot, compared, **given.how, held=given.held, seed=asked.seed, progress=asked.progress)
+        selection = select(robot, compared, **read.options, held=read.fixed, seed=asked.seed, progress=asked.progress)
         with followed(asked.progress, parts.judges, held_out=parts.second is not None):
             selection, fit = identify_chosen(
                 robot,
                 first,
                 selection,
-                **given.how,
-                held=given.held,
+                **read.options,
+                held=read.fixed,
                 bootstrap=asked.bootstrap,
                 seed=asked.seed,
                 progress=asked.progress,
@@ -339,49 +339,49 @@ def _identified(asked: Calibrate, given: _Read, parts: _Parts) -> _Found:
         robot, model = selection.prepared(robot), selection.model
         notices += [*check_choice(selection), *check_part(compared, first)]
     else:
-        model, notices = without_unseen_balancers(given.model, first)
+        model, notices = without_unseen_balancers(read.model, first)
         asked.progress(f"identifying the {model.name} model on {len(parts.training)} configurations")
         with followed(asked.progress, parts.judges, held_out=parts.second is not None):
             fit = identify(
                 robot,
                 first,
                 model,
-                **given.how,
-                held=given.held,
+                **read.options,
+                fixed=read.fixed,
                 bootstrap=asked.bootstrap,
                 seed=asked.seed,
                 progress=asked.progress,
             )
-    contradicted = check_held(robot, fit, first, **given.how)
-    return _Found(robot, placed, model, fit, selection, tuple(contradicted), tuple(notices))
+    contradicted = check_fixed_places(robot, fit, first, **read.options)
+    return _Identified(robot, placed, model, fit, selection, tuple(contradicted), tuple(notices))
 
 
-def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Calibration:
+def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -> Calibration:
     """Judge what was identified by the part that it has not seen."""
     asked.progress("judging it")
-    fit, first, second = found.fit, parts.first, parts.second
+    fit, first, second = solved.fit, parts.first, parts.second
     validation = None if second is None else errors_of(fit.robot, second)
     train_errors = errors_of(fit.robot, first)
     of_split = (
-        *found.contradicted,
-        *_beside_nominal(found.placed, fit, first, second, parts.noticed, given.held),
+        *solved.contradicted,
+        *_beside_nominal(solved.placed, fit, first, second, parts.noticed, read.fixed),
         *check_excluded(
             parts.excluded,
             fit.robot,
-            None if asked.base_changes else left_out(given.as_read, asked.without),
+            None if asked.base_changes else left_out(read.as_read, asked.without),
             parts.held_out,
             validation,
         ),
         *check_copies(parts.readings, parts.training, parts.held_out),
         *check_trained_before(
-            found.robot,
-            given.as_read,
-            given.sha256,
+            solved.robot,
+            read.as_read,
+            read.sha256,
             (len(parts.training), parts.readings.configurations, asked.seed),
             without_words(asked.without),
         ),
         *parts.moved,
-        *found.notices,
+        *solved.notices,
     )
     diagnosis = diagnose(
         Case(
@@ -394,9 +394,9 @@ def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Cal
             held_out=second is not None,
         )
     )
-    simulated, told = None, list[Notice]()
+    simulated, notices = None, list[Notice]()
     if asked.monte_carlo is not None:
-        simulated, told = simulate_calibrations(
+        simulated, notices = simulate_calibrations(
             fit,
             first,
             second,
@@ -406,28 +406,28 @@ def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Cal
             progress=asked.progress,
         )
     zones = None
-    if given.zones is not None and second is not None:
+    if read.zones is not None and second is not None:
         asked.progress("identifying zones")
-        bounds = given.how["bounds"]
+        bounds = read.options["bounds"]
         zones = choose_zones(
-            given.zones, found.robot, fit, (first, second), loss=asked.loss, redundancy=asked.redundancy, bounds=bounds
+            read.zones, solved.robot, fit, (first, second), loss=asked.loss, redundancy=asked.redundancy, bounds=bounds
         )
     return Calibration(
         fit=fit,
-        nominal=errors_of(found.placed, parts.judges),
+        nominal=errors_of(solved.placed, parts.judges),
         train=train_errors,
         validation=validation,
         expected=diagnosis.expected,
-        warnings=(*diagnosis.warnings, *told),
+        warnings=(*diagnosis.warnings, *notices),
         next=diagnosis.next,
         data=parts.readings,
         training=parts.training,
         held_out=parts.held_out,
         command=asked.again,
-        history=_history(asked, given, parts, found),
-        urdf=given.urdf,
-        selection=found.selection,
-        known_before=_known_before(found.robot),
+        history=_history(asked, read, parts, solved),
+        urdf=read.urdf,
+        selection=solved.selection,
+        known_before=_known_before(solved.robot),
         without=tuple(asked.without),
         excluded=parts.excluded,
         notes=dict(asked.notes or {}),
@@ -436,17 +436,17 @@ def _judged(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> Cal
     )
 
 
-def _history(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> str:
+def _history(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -> str:
     """Return what was done, in one line with the hash of the data."""
-    by_file = "" if given.sha256 is None else f"sha256 {given.sha256[:12]}, "
-    digest = f" ({by_file}readings {readings_digest(given.as_read)[:12]})"
-    freed = " + ".join([found.model.name, *(name for name in asked.effects if name in found.model.effects)])
+    by_file = "" if read.sha256 is None else f"sha256 {read.sha256[:12]}, "
+    digest = f" ({by_file}readings {readings_digest(read.as_read)[:12]})"
+    freed = " + ".join([solved.model.name, *(name for name in asked.effects if name in solved.model.effects)])
     return (
         f"calibrated by truearm {__version__}: model {freed},"
         f" {len(parts.training)} of {parts.readings.configurations} configurations of"
         f" {Path(parts.readings.source).name}{digest}, seed {asked.seed}, loss {asked.loss},"
         f"{without_words(asked.without)}"
-        f"{f' {sum(one.readings for one in parts.excluded)} readings excluded,' if parts.excluded else ''}"
+        f"{f' {sum(rows.readings for rows in parts.excluded)} readings excluded,' if parts.excluded else ''}"
         f" redundancy {asked.redundancy}{f', {listed(asked.hold)} held' if asked.hold else ''}"
         f"{f', bootstrap {asked.bootstrap}' if asked.bootstrap else ''}"
         f"{f', another base from {listed(asked.base_changes)} on' if asked.base_changes else ''}"
@@ -454,7 +454,7 @@ def _history(asked: Calibrate, given: _Read, parts: _Parts, found: _Found) -> st
 
 
 def _beside_nominal(
-    placed: Robot, fit: Fit, training: Dataset, held_out: Dataset | None, noticed: Sequence[Notice], held: Held
+    placed: Robot, fit: Fit, training: Dataset, held_out: Dataset | None, noticed: Sequence[Notice], fixed: FixedPlaces
 ) -> list[Notice]:
     """Say what the held-out part tells of the calibrated robot beside the nominal one.
 
@@ -469,7 +469,7 @@ def _beside_nominal(
     if fit.model is FRAMES:  # the robot is the nominal one
         return []
     doubted = fit.loss in PULLED and any(notice.code in DOUBTED for notice in noticed)
-    nominal = place(fit.start, training, "cauchy", held) if doubted else placed
+    nominal = place(fit.start, training, "cauchy", fixed) if doubted else placed
     return check_gain(errors_of(nominal, held_out), errors_of(fit.robot, held_out), held_out, doubted=doubted)
 
 

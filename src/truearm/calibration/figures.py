@@ -16,7 +16,7 @@ from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.choosing.cross_validation import FOLDS
 from truearm.engine.choosing.selection import Selection
 from truearm.engine.choosing.zones import Box, shown_box
-from truearm.engine.diagnose.curves import FoundCurve
+from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.error_budget import ErrorBudget, Share, shown_shares
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
 from truearm.engine.document.document import Cell, Table
@@ -56,9 +56,9 @@ def budget_table(budget: ErrorBudget) -> Table:
         )
         for share in budget.shares
     ]
-    what = "all held-out readings together" if budget.held_out else "all together"
+    subject = "all held-out readings together" if budget.held_out else "all together"
     words = "the uncertainty is that by the scatter of the configurations"
-    rows.append((what, significant(budget.rms * 1e3), "100 %", _squares(budget.square, budget.deviation), words))
+    rows.append((subject, significant(budget.rms * 1e3), "100 %", _squares(budget.square, budget.deviation), words))
     heading = ("source", "rms [mm]", "of the square", "square [mm²]", "how it is known")
     return Table(heading, rows, texts=(4,), name="budget", wide=True)
 
@@ -98,12 +98,12 @@ def _stairs(shares: Sequence[Share], total: float, together: str) -> Figure:
     }
     edges = np.concatenate([begins, begins + lengths])
     low, high = min(float(edges.min()), 0.0), float(edges.max())
-    room = 0.22 * max(high - low, 1e-12)
+    margin = 0.22 * max(high - low, 1e-12)
     return figure(
         [trace],
         _AROUND + _BAR * len(names),
         xaxis=axis("mean square [mm²]")
-        | {"exponentformat": "none", "range": [low - (room if low < 0.0 else 0.0), high + room]},
+        | {"exponentformat": "none", "range": [low - (margin if low < 0.0 else 0.0), high + margin]},
         yaxis={**axis(""), "autorange": "reversed", "showgrid": False, "ticks": ""},
         bargap=0.3,
         margin={"l": 60, "r": 20, "t": 12, "b": 50},
@@ -131,19 +131,19 @@ _PLACES: Final = "#646b72"
 #: Width of an interval of 95 % to either side in standard deviations.
 _NORMAL_95: Final = 1.959964
 #: Beyond so many times the size of the measured part the picture ends, however wide the band.
-_ROOM: Final = 4.0
+_LARGEST_RATIO: Final = 4.0
 
 
-def curve_name(curve: FoundCurve) -> str:
+def curve_name(curve: FittedCurve) -> str:
     """Return the name of the place of its picture."""
     return f"joint-curve-{curve.number}"
 
 
-def curves_table(curves: Sequence[FoundCurve]) -> Table:
+def curves_table(curves: Sequence[FittedCurve]) -> Table:
     """Return a row for each curve; its band is the median one where it was measured."""
     rows = []
     for curve in curves:
-        groups = [f"{one.range} ({significant(mdeg(one.amplitude), 2, 1)} mdeg)" for one in curve.strongest]
+        groups = [f"{group.range} ({significant(mdeg(group.amplitude), 2, 1)} mdeg)" for group in curve.strongest]
         ranges = [f"{low:.0f} to {high:.0f}" for low, high in np.degrees(curve.measured).reshape(-1, 2).tolist()]
         inside = _measured(curve)
         half = _NORMAL_95 * np.median(curve.at(curve.angles[inside])[1]) if inside.any() else np.nan
@@ -160,18 +160,18 @@ def curves_table(curves: Sequence[FoundCurve]) -> Table:
     return Table(heading, rows, texts=(3, 4), name="curve-table", wide=True)
 
 
-def curve_figure(curve: FoundCurve) -> Figure:
+def curve_figure(curve: FittedCurve) -> Figure:
     """Show what a joint turns beyond its position, over its range; where nothing was measured the ground is grey."""
     value, deviation = (mdeg(1.0) * part for part in curve.at(curve.angles))
     low, high = value - _NORMAL_95 * deviation, value + _NORMAL_95 * deviation
     degrees = np.degrees(curve.angles)
     x = rounded_to(degrees, 2)
     inside = _measured(curve)
-    here = slice(None) if not inside.any() else inside
-    ends = float(np.min(low[here])), float(np.max(high[here]))
+    shown = slice(None) if not inside.any() else inside
+    ends = float(np.min(low[shown])), float(np.max(high[shown]))
     middle, half = sum(ends) / 2.0, max((ends[1] - ends[0]) / 2.0, 1e-3)
-    bottom = max(float(low.min()), middle - _ROOM * half) - 0.16 * half
-    top = min(float(high.max()), middle + _ROOM * half) + 0.08 * half
+    bottom = max(float(low.min()), middle - _LARGEST_RATIO * half) - 0.16 * half
+    top = min(float(high.max()), middle + _LARGEST_RATIO * half) + 0.08 * half
     spot: Figure = {"type": "scatter", "x": x, "hoverinfo": "skip", "showlegend": False}
     traces: list[Figure] = [
         spot | {"mode": "lines", "y": rounded_to(low, 3), "line": {"width": 0, "color": _BAND}},
@@ -220,7 +220,7 @@ def curve_figure(curve: FoundCurve) -> Figure:
     )
 
 
-def _measured(curve: FoundCurve) -> Array:
+def _measured(curve: FittedCurve) -> Array:
     """Return at which of its angles a curve was measured."""
     inside = np.zeros(len(curve.angles), dtype=bool)
     for low, high in curve.measured:
@@ -240,41 +240,43 @@ def _gaps(measured: Array, start: float, end: float) -> list[tuple[float, float]
 _CLAIMED = 0.95
 
 
-def intervals_table(found: SimulatedCalibrations, robot: Robot) -> Table:
+def intervals_table(simulated: SimulatedCalibrations, robot: Robot) -> Table:
     """Return a row for each parameter that was free, in the order of the fit, but for terms of joint curves."""
     rows = []
-    for i, name in enumerate(found.names):
+    for i, name in enumerate(simulated.names):
         if robot.parameters[name].group == JointCurve.name:
             continue
         unit = SHOWN_AS[robot.parameters[name].unit]
-        linear, deviation = (from_si(float(d[i]), unit) for d in (found.linear_deviation, found.deviation))
+        linear, deviation = (from_si(float(d[i]), unit) for d in (simulated.linear_deviation, simulated.deviation))
         places = decimals_of(deviation, 6)
         of_linear, of_trials = (
             " to ".join(f"{from_si(end, unit):.{places}f}" for end in interval[i].tolist())
-            for interval in (found.linear_interval_95, found.interval_95)
+            for interval in (simulated.linear_interval_95, simulated.interval_95)
         )
         deviations = (significant(linear, 2, 6), significant(deviation, 2, 6))
-        held = f"{100.0 * float(found.coverage[i]):.1f} %"
-        rows.append((Cell(name, code=True), unit, of_linear, of_trials, *deviations, held))
+        coverage = f"{100.0 * float(simulated.coverage[i]):.1f} %"
+        rows.append((Cell(name, code=True), unit, of_linear, of_trials, *deviations, coverage))
     heading = ("parameter", "unit", "linear", "by Monte Carlo", "deviation, linear", "by Monte Carlo")
     return Table((*heading, "linear interval held"), rows, texts=(1,), name="intervals", wide=True)
 
 
-def coverage_figure(found: SimulatedCalibrations, robot: Robot) -> Figure:
+def coverage_figure(simulated: SimulatedCalibrations, robot: Robot) -> Figure:
     """Show the share of trials in which the linear interval of each of the arm's parameters held the truth.
 
     Between the dotted lines lie 95 of 100 shares of so many trials, if the intervals hold 95 % of the truths.
     """
     beside = (*PLACES, JointCurve.name)
-    own = [i for i, name in enumerate(found.names) if robot.parameters[name].group not in beside]
-    own = own or list(range(len(found.names)))
-    shares = 100.0 * found.coverage[own]
-    ratio = found.deviation[own] / np.where(found.linear_deviation[own] > 0.0, found.linear_deviation[own], np.nan)
-    band = 196.0 * math.sqrt(_CLAIMED * (1.0 - _CLAIMED) / max(found.settled, 1))
+    own = [i for i, name in enumerate(simulated.names) if robot.parameters[name].group not in beside]
+    own = own or list(range(len(simulated.names)))
+    shares = 100.0 * simulated.coverage[own]
+    ratio = simulated.deviation[own] / np.where(
+        simulated.linear_deviation[own] > 0.0, simulated.linear_deviation[own], np.nan
+    )
+    band = 196.0 * math.sqrt(_CLAIMED * (1.0 - _CLAIMED) / max(simulated.settled, 1))
     trace = {
         "type": "scatter",
         "mode": "markers",
-        "x": [html.escape(found.names[i]) for i in own],
+        "x": [html.escape(simulated.names[i]) for i in own],
         "y": rounded(shares, 4),
         "customdata": ["–" if np.isnan(r) else f"{r:.2f}" for r in ratio.tolist()],
         "marker": {"color": AFTER, "size": 7},
@@ -362,23 +364,25 @@ def candidates_figure(selection: Selection) -> Figure:
     The axis is linear near no gain and logarithmic beyond, so that what little effects gain is seen beside a large one.
     """
     tried = [candidate for candidate in reversed(selection.candidates) if candidate.gain is not None]
-    errors = [1e3 * one.gain.error for one in tried if one.gain is not None and one.gain.error > 0.0]
+    errors = [
+        1e3 * candidate.gain.error for candidate in tried if candidate.gain is not None and candidate.gain.error > 0.0
+    ]
     linear = max(float(np.median(errors)) if errors else 0.0, _SMALLEST)
     ends: list[float] = [linear]
     traces = []
     for taken, name, colour in ((True, "taken", AFTER), (False, "left out", BEFORE)):
-        mine = [one for one in tried if one.taken is taken]
-        gains = np.array([1e3 * one.gain.mean for one in mine if one.gain is not None])
-        error = np.array([1e3 * one.gain.error for one in mine if one.gain is not None])
-        place = _bent(gains, linear)
-        above, below = _bent(gains + error, linear), _bent(gains - error, linear)
+        of_kind = [candidate for candidate in tried if candidate.taken is taken]
+        gains = np.array([1e3 * candidate.gain.mean for candidate in of_kind if candidate.gain is not None])
+        error = np.array([1e3 * candidate.gain.error for candidate in of_kind if candidate.gain is not None])
+        place = _on_axis(gains, linear)
+        above, below = _on_axis(gains + error, linear), _on_axis(gains - error, linear)
         ends += [*(gains + error).tolist(), *(gains - error).tolist()]
         traces.append(
             {
                 "type": "bar",
                 "orientation": "h",
                 "name": name,
-                "y": [html.escape(one.effect) for one in mine],
+                "y": [html.escape(candidate.effect) for candidate in of_kind],
                 "x": rounded(place, 4),
                 "customdata": rounded(gains, 4),
                 "error_x": {
@@ -392,30 +396,30 @@ def candidates_figure(selection: Selection) -> Figure:
             }
         )
     low, high = min(min(ends), -linear), max(max(ends), linear)
-    left, right = _bent(np.array([low, high]), linear).tolist()
-    room = 0.2 * (right - left)
+    left, right = _on_axis(np.array([low, high]), linear).tolist()
+    margin = 0.2 * (right - left)
     marks = [0.0, *(sign * 10.0**power for power in range(-5, 3) for sign in (-1.0, 1.0))]
     marks = sorted(mark for mark in marks if low <= mark <= high and (mark == 0.0 or abs(mark) >= 0.5 * linear))
     labels = [
         {
             "x": 1.0,
             "xref": "paper",
-            "y": html.escape(one.effect),
-            "text": f"{one.gain.mean * 1e3:+.4f} ± {one.gain.error * 1e3:.4f}",
+            "y": html.escape(candidate.effect),
+            "text": f"{candidate.gain.mean * 1e3:+.4f} ± {candidate.gain.error * 1e3:.4f}",
             "xanchor": "right",
             "showarrow": False,
             "font": {"size": 11},
         }
-        for one in tried
-        if one.gain is not None
+        for candidate in tried
+        if candidate.gain is not None
     ]
     return figure(
         traces,
         120 + 26 * len(tried),
         xaxis={
             **axis("gain of the mean held-out error [mm], logarithmic beyond its usual standard error"),
-            "range": [left - 0.02 * (right - left), right + room],
-            "tickvals": rounded(_bent(np.array(marks), linear), 4),
+            "range": [left - 0.02 * (right - left), right + margin],
+            "tickvals": rounded(_on_axis(np.array(marks), linear), 4),
             "ticktext": [f"{mark:g}" for mark in marks],
         },
         yaxis={**axis(""), "type": "category", "categoryorder": "array", "categoryarray": [o.effect for o in tried]},
@@ -424,7 +428,7 @@ def candidates_figure(selection: Selection) -> Figure:
     )
 
 
-def _bent(gain: Array, linear: float) -> Array:
+def _on_axis(gain: Array, linear: float) -> Array:
     """Return where gains [mm] are drawn: in proportion up to about `linear`, by their logarithm beyond."""
     return np.asarray(np.sign(gain) * np.log10(1.0 + np.abs(gain) / linear))
 
@@ -444,10 +448,10 @@ def zones_table(choice: ZoneChoice) -> Table:
         )
         for verdict in choice.verdicts
     ]
-    kept = tuple("taken" if verdict.kept else "" for verdict in choice.verdicts)
+    marks = tuple("taken" if verdict.kept else "" for verdict in choice.verdicts)
     heading = ("zone", "x, y, z of the flange [mm]", "training", "held out", "one model [mm]", "own model [mm]")
     more = ("difference good to", "verdict")
-    return Table((*heading, *more), rows, texts=(1, 7), name="zone-table", wide=True, marks=kept)
+    return Table((*heading, *more), rows, texts=(1, 7), name="zone-table", wide=True, marks=marks)
 
 
 def _mm(value: float | None) -> str:

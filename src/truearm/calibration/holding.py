@@ -11,7 +11,7 @@ import numpy as np
 from truearm.engine.base.errors import InputError, did_you_mean, refusals_of
 from truearm.engine.base.files import path_argument
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.programs.cell import KnownPlace, read_known_places
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
@@ -22,7 +22,7 @@ _ALL: Final = ("targets", "fixtures")
 _AS_BASE: Final = "quaternion: [1, 0, 0, 0]"
 
 
-def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Dataset) -> Held:
+def fixed_places_argument(hold: Sequence[str], frames: object, robot: Robot, data: Dataset) -> FixedPlaces:
     """Return what is held, with its places from a file.
 
     Args:
@@ -34,7 +34,7 @@ def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Datas
         InputError: If numbers are missing, if something is held that the readings do not have or do not see, or twice.
     """
     if not hold and frames is None:
-        return NOTHING_HELD
+        return NOTHING_FIXED
     if not hold:
         raise InputError(
             "frames are given, and nothing is held at them",
@@ -64,7 +64,7 @@ def held_argument(hold: Sequence[str], frames: object, robot: Robot, data: Datas
             came=_BASE,
             cure="Hold the fixtures too, whose places in the same frame are known, or leave the base out.",
         )
-    return Held(stands, on_flange, beside)
+    return FixedPlaces(stands, on_flange, beside)
 
 
 def _named(hold: Sequence[str], data: Dataset) -> tuple[bool, tuple[str, ...], tuple[str, ...]]:
@@ -106,7 +106,7 @@ def _named(hold: Sequence[str], data: Dataset) -> tuple[bool, tuple[str, ...], t
                 allowed=", ".join(known),
                 cure=did_you_mean(name, known),
             )
-        twice = [one for one in more if one in chosen]
+        twice = [text for text in more if text in chosen]
         if twice:
             raise InputError(
                 "this is held twice", parameter="hold", came=f"{name} ({twice[0]})", cure="Name each once, or all."
@@ -127,11 +127,11 @@ def _entry(entries: Mapping[str, KnownPlace], name: str, part: str, path: Path) 
     return entries[name]
 
 
-def _whole(entry: KnownPlace, what: str) -> Transform:
+def _whole(entry: KnownPlace, subject: str) -> Transform:
     """Return a place with an orientation, which nobody may leave to chance."""
     if not entry.turned:
         raise InputError(
-            f"{what} has an orientation, and the entry does not say how it is turned",
+            f"{subject} has an orientation, and the entry does not say how it is turned",
             parameter="frames",
             where=entry.where,
             cure=f"Add its orientation, {_AS_BASE} if it is not turned.",
@@ -155,8 +155,8 @@ def _base(places: Mapping[str, KnownPlace], robot: Robot, path: Path) -> Transfo
 
 def _target(tools: Mapping[str, KnownPlace], name: str, data: Dataset, path: Path) -> Transform:
     entry = _entry(tools, name, "tools", path)
-    mine = data.target == data.targets.index(name)
-    turned = data.quaternion is not None and bool(np.isfinite(data.quaternion[mine]).any())
+    of_target = data.target == data.targets.index(name)
+    turned = data.quaternion is not None and bool(np.isfinite(data.quaternion[of_target]).any())
     return _whole(entry, f"target {name}") if turned else entry.place
 
 
@@ -172,10 +172,10 @@ def _fixture(
             came=f"held, and measured in a row of the role fixture in {data.source}",
             cure="Remove one of them.",
         )
-    mine = data.against == data.fixtures.index(name)
-    counted = data.position[mine][np.isfinite(data.position[mine]).all(axis=1)]
-    turned = data.quaternion is not None and bool(np.isfinite(data.quaternion[mine]).any())
-    over = data.height is not None and bool(np.isfinite(data.height[mine]).any())
+    of_fixture = data.against == data.fixtures.index(name)
+    counted = data.position[of_fixture][np.isfinite(data.position[of_fixture]).all(axis=1)]
+    turned = data.quaternion is not None and bool(np.isfinite(data.quaternion[of_fixture]).any())
+    over = data.height is not None and bool(np.isfinite(data.height[of_fixture]).any())
     has_axes = turned or over or bool(len(counted) and np.ptp(counted, axis=0).any())
     place = _whole(entry, f"fixture {name}") if has_axes else entry.place
     if entry.of == "world" and (base is not None or data.anchored):

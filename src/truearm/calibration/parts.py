@@ -17,7 +17,7 @@ from truearm.engine.base.files import read_text
 from truearm.engine.base.units import SHOWN_AS, Marked, from_si, parts_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.curves import FoundCurve
+from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.error_budget import ErrorBudget, Share
 from truearm.engine.diagnose.expected_error import ExpectedError, covariance_root, uncertain_names
 from truearm.engine.diagnose.gain import NO_GAIN
@@ -25,7 +25,7 @@ from truearm.engine.diagnose.simulated_calibrations import PredictedError, Simul
 from truearm.engine.document.document import Block, detail, say
 from truearm.engine.document.records import Record
 from truearm.engine.fit.fit import Fit, Status
-from truearm.engine.programs.gauge import held_by
+from truearm.engine.programs.gauge import fixed_by
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.loads import joint_efforts
@@ -91,29 +91,29 @@ def budget_block(budget: ErrorBudget | None) -> Block:
     if budget is None:
         return detail(limits_of_accuracy=None)
     places = min(max(3, 1 - math.floor(math.log10(max(budget.rms * 1e3, 1e-9)))), 6)
-    what = "held out" if budget.held_out else "to expect at configurations like these"
+    subject = "held out" if budget.held_out else "to expect at configurations like these"
     shares = sum(share.square or 0.0 for share in budget.shares if share.source != "remainder")
-    told = [
+    shown = [
         share
         for share in budget.shares
         if share.source != "remainder" and (_is_sure(share) or (share.square or 0.0) > _LARGE * max(shares, 0.0))
     ]
-    told.sort(key=lambda share: -(share.square or 0.0))
+    shown.sort(key=lambda share: -(share.square or 0.0))
     parts = [
         f"{name_of(share)} {'' if _is_sure(share) else 'perhaps '}{(share.rms or 0.0) * 1e3:.{places}f} mm"
-        for share in told
+        for share in shown
     ]
     together = math.sqrt(max(shares, 0.0))
-    rest = "the same within its uncertainty" if budget.held_out else "which is their sum"
+    comparison = "the same within its uncertainty" if budget.held_out else "which is their sum"
     if budget.held_out and not (budget.remainder_is_chance and budget.square < _ALIKE * shares):
         left = next(share for share in budget.shares if share.source == "remainder").rms or 0.0
-        rest = f"in squares {abs(left) * 1e3:.{places}f} mm {'more' if left > 0.0 else 'less'} than they explain"
+        comparison = f"in squares {abs(left) * 1e3:.{places}f} mm {'more' if left > 0.0 else 'less'} than they explain"
     for share in budget.shares:
         if share.square is not None and share.source != "remainder" and share.square < -_SURE * share.deviation:
-            rest += f"; {name_of(share)} takes {abs(share.rms or 0.0) * 1e3:.{places}f} mm away, see the report"
+            comparison += f"; {name_of(share)} takes {abs(share.rms or 0.0) * 1e3:.{places}f} mm away, see the report"
     return detail(
         f"What limits the accuracy: {', '.join(parts) or 'nothing that is more than chance'}; all shares together, in "
-        f"squares, {together * 1e3:.{places}f} mm, {what} {budget.rms * 1e3:.{places}f} mm, {rest}",
+        f"squares, {together * 1e3:.{places}f} mm, {subject} {budget.rms * 1e3:.{places}f} mm, {comparison}",
         limits_of_accuracy={
             "of": "held-out" if budget.held_out else "expected",
             "kind": budget.kind,
@@ -133,9 +133,9 @@ def _is_sure(share: Share) -> bool:
     return share.square is not None and share.square > _SURE * share.deviation
 
 
-def curve_block(curve: FoundCurve) -> Block:
+def curve_block(curve: FittedCurve) -> Block:
     """Return size, strongest periods and measured ranges of a curve; told are amplitudes of half of the strongest."""
-    *others, last = [one.range for one in curve.strongest if 2.0 * one.amplitude >= curve.strongest[0].amplitude]
+    *others, last = [group.range for group in curve.strongest if 2.0 * group.amplitude >= curve.strongest[0].amplitude]
     periods = f"{', '.join(others)} and {last}" if others else last
     return detail(
         f"Joint {curve.number}: curve of {math.degrees(curve.rms):#.2g} +- "
@@ -145,7 +145,8 @@ def curve_block(curve: FoundCurve) -> Block:
         rms_mdeg=mdeg(curve.rms),
         rms_deviation_mdeg=mdeg(curve.rms_deviation),
         strongest=[
-            {"periods": [one.lowest, one.highest], "amplitude_mdeg": mdeg(one.amplitude)} for one in curve.strongest
+            {"periods": [group.lowest, group.highest], "amplitude_mdeg": mdeg(group.amplitude)}
+            for group in curve.strongest
         ],
         measured_deg=[[math.degrees(low), math.degrees(high)] for low, high in curve.measured],
     )
@@ -156,12 +157,12 @@ def mdeg(angle: float) -> float:
     return 1e3 * math.degrees(angle)
 
 
-def simulated_block(found: SimulatedCalibrations, robot: Robot) -> Block:
+def simulated_block(simulated: SimulatedCalibrations, robot: Robot) -> Block:
     """Return what simulated calibrations say of intervals, those by Monte Carlo beside the linear ones."""
-    made: dict[str, Any] = {"trials": found.asked, "settled": found.settled, "seed": found.seed}
-    if not found.settled:
-        return say(f"Monte Carlo: none of {found.asked} simulated calibrations converged", monte_carlo=made)
-    coverage, error, words = arm_coverage(found, robot), found.held_out, ""
+    content: dict[str, Any] = {"trials": simulated.asked, "settled": simulated.settled, "seed": simulated.seed}
+    if not simulated.settled:
+        return say(f"Monte Carlo: none of {simulated.asked} simulated calibrations converged", monte_carlo=content)
+    coverage, error, words = arm_coverage(simulated, robot), simulated.held_out, ""
     if error is not None:
         ends, linear = (
             " to ".join(f"{end * 1e3:.3f}" for end in pair) for pair in (error.interval_90, error.linear_interval_90)
@@ -170,27 +171,27 @@ def simulated_block(found: SimulatedCalibrations, robot: Robot) -> Block:
             f"; uncertain parameters move unseen positions by {error.mean * 1e3:.3f} mm on average "
             f"(90 %: {ends}; linear: {error.linear_mean * 1e3:.3f}, {linear})"
         )
-    made |= {
+    content |= {
         "coverage": coverage,
-        "predictions_mm": {"held_out": _predicted(error), "workspace": _predicted(found.workspace)},
-        "parameters": _interval_rows(found, robot),
+        "predictions_mm": {"held_out": _predicted(error), "workspace": _predicted(simulated.workspace)},
+        "parameters": _interval_rows(simulated, robot),
     }
     return say(
-        f"Monte Carlo: in {found.settled} simulated calibrations {100.0 * coverage:.1f} % of the linear 95 % intervals "
-        f"held the truth{words}",
-        monte_carlo=made,
+        f"Monte Carlo: in {simulated.settled} simulated calibrations {100.0 * coverage:.1f} % of the linear 95 % "
+        f"intervals held the truth{words}",
+        monte_carlo=content,
     )
 
 
-def _interval_rows(found: SimulatedCalibrations, robot: Robot) -> list[dict[str, Any]]:
+def _interval_rows(simulated: SimulatedCalibrations, robot: Robot) -> list[dict[str, Any]]:
     rows = []
     for name, deviation, linear, interval, of_linear, coverage in zip(
-        found.names,
-        found.deviation.tolist(),
-        found.linear_deviation.tolist(),
-        found.interval_95.tolist(),
-        found.linear_interval_95.tolist(),
-        found.coverage.tolist(),
+        simulated.names,
+        simulated.deviation.tolist(),
+        simulated.linear_deviation.tolist(),
+        simulated.interval_95.tolist(),
+        simulated.linear_interval_95.tolist(),
+        simulated.coverage.tolist(),
         strict=True,
     ):
         if robot.parameters[name].group == JointCurve.name:
@@ -221,13 +222,13 @@ def _predicted(error: PredictedError | None) -> dict[str, Any] | None:
     }
 
 
-def arm_coverage(found: SimulatedCalibrations, robot: Robot) -> float:
+def arm_coverage(simulated: SimulatedCalibrations, robot: Robot) -> float:
     """Return the share of linear intervals that held the truth, over the arm's parameters; of all if it has none.
 
     Terms of joint curves do not count: each is a part of a curve.
     """
-    own = np.array([robot.parameters[name].group not in (*PLACES, JointCurve.name) for name in found.names])
-    return float(found.coverage[own if own.any() else ~own].mean())
+    own = np.array([robot.parameters[name].group not in (*PLACES, JointCurve.name) for name in simulated.names])
+    return float(simulated.coverage[own if own.any() else ~own].mean())
 
 
 # The result that is in a folder already: a sound one is not replaced by one that is not, unless that is asked for.
@@ -323,7 +324,7 @@ def proof_of(
     errors = [notice for notice in warnings if notice.level == "error"]
     repeated = [notice for notice in warnings if notice.code in _REPEATED]
     lower_bound = expected.lower_bound
-    held = [*held_by(fit)]
+    fixed = [*fixed_by(fit)]
     names, root = uncertain_names(fit), covariance_root(fit, fit.covariance_with_unfitted)
     parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
@@ -331,12 +332,12 @@ def proof_of(
     loads = loads_of(fit.robot, training.postures)
     if before is not None:
         arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
-        kept = [i for i, name in enumerate(before.names) if name in arm and name not in names]
-        if kept or not any(name in arm for name in names):
+        earlier = [i for i, name in enumerate(before.names) if name in arm and name not in names]
+        if earlier or not any(name in arm for name in names):
             ended = before.status if ended in SOUND else ended
             errors += [error for error in before.errors if error.code not in [e.code for e in errors]]
             repeated += [warning for warning in before.warnings if not repeated]
-            parameters += [arm[before.names[i]] for i in kept]
+            parameters += [arm[before.names[i]] for i in earlier]
             region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
             measured = [*before.measured, *measured] if before.measured else []
             # By older versions nothing is known of the loads before.
@@ -344,9 +345,9 @@ def proof_of(
             loads = [(min(a, c), max(b, d)) for (a, b), (c, d) in pairs]
             joint_error = np.maximum(joint_error, before.joint_error or 0.0)
             lower_bound = lower_bound or before.lower_bound
-            held += [word for word in before.held if word in HELD and word not in held]
-            beside = np.zeros((len(covariance), len(kept)))
-            covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(kept, kept)]]])
+            fixed += [word for word in before.held if word in HELD and word not in fixed]
+            beside = np.zeros((len(covariance), len(earlier)))
+            covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(earlier, earlier)]]])
     return Proof.of(
         ended,
         errors,
@@ -356,7 +357,7 @@ def proof_of(
         covariance,
         warnings=repeated,
         lower_bound=lower_bound,
-        held=held,
+        held=fixed,
         measured=measured,
         joint_units=["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints],
         loads=loads,
@@ -430,8 +431,8 @@ class Residuals(Record):
         for kind, unit in (("position", "mm"), ("orientation", "mrad"), ("length", "mm")):
             rows = np.flatnonzero(self.kind == kind)
             for row in rows[np.argsort(-self.norm[rows], kind="stable")][:_SHOWN].tolist():
-                where = f"{self.configuration[row]}/{self.target[row]}"
-                yield say(f"  {kind:<11} {where:<16} {self.part[row]:<8} {self.norm[row] * 1e3:.3f} {unit}")
+                reading = f"{self.configuration[row]}/{self.target[row]}"
+                yield say(f"  {kind:<11} {reading:<16} {self.part[row]:<8} {self.norm[row] * 1e3:.3f} {unit}")
 
     def to_pandas(self) -> Any:
         """Return the rows as a pandas DataFrame, the error in columns ``ex``, ``ey``, ``ez``; pandas is needed for it.
@@ -461,14 +462,14 @@ def residuals_of(parts: Iterable[tuple[Part, Dataset, Errors]]) -> Residuals:
     """
     parts, names = [*parts], list[tuple[str, str, Part, Kind]]()
     errors = [np.zeros((0, 3))]
-    for part, data, found in parts:
+    for part, data, part_errors in parts:
         length = None
-        if found.length_errors is not None:
-            length = np.full((len(found.length_errors), 3), np.nan)
-            length[:, 0] = found.length_errors
+        if part_errors.length_errors is not None:
+            length = np.full((len(part_errors.length_errors), 3), np.nan)
+            length[:, 0] = part_errors.length_errors
         kinds: tuple[tuple[Kind, Array | None], ...] = (
-            ("position", found.position_errors),
-            ("orientation", found.orientation_errors),
+            ("position", part_errors.position_errors),
+            ("orientation", part_errors.orientation_errors),
             ("length", length),
         )
         for kind, values in kinds:

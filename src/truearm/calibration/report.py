@@ -221,7 +221,7 @@ def _certified(run: Calibration) -> list[tuple[str, str | Sequence[NextStep]]]:
     robot = run.fit.robot
     facts: list[tuple[str, str | Sequence[NextStep]]] = [("Robot", f"{robot.title} (`{robot.name}`)")]
     facts += [(shown, run.notes.get(name, "")) for name, shown in _NOTED.items()]
-    facts += [(name.capitalize(), said) for name, said in run.notes.items() if name not in _NOTED]
+    facts += [(name.capitalize(), note) for name, note in run.notes.items() if name not in _NOTED]
     facts.append(("Status", run.status.value))
     if run.advice:
         facts.append(("What to do", run.advice))
@@ -238,7 +238,10 @@ def _certified(run: Calibration) -> list[tuple[str, str | Sequence[NextStep]]]:
     if run.without:
         facts.append(("Left out", ", ".join(run.without)))
     if run.excluded:
-        rows = (f"{one.row.configuration}/{one.row.target} ({one.part}): {one.row.reason}" for one in run.excluded)
+        rows = (
+            f"{excluded.row.configuration}/{excluded.row.target} ({excluded.part}): {excluded.row.reason}"
+            for excluded in run.excluded
+        )
         facts.append(("Excluded", "; ".join(rows)))
     facts.append(("Targets", ", ".join(run.data.targets)))
     if run.data.fixtures:
@@ -249,9 +252,9 @@ def _certified(run: Calibration) -> list[tuple[str, str | Sequence[NextStep]]]:
 def _result(report: Report) -> Section:
     """Return the answer: errors before and after, and the error to expect elsewhere."""
     run = report.calibration
-    held = run.validation is not None
+    held_out = run.validation is not None
     blocks: list[Block] = []
-    if not held:
+    if not held_out:
         words = (
             "Every error below is one of the training readings: it says how well the model follows the data it was "
             "made from, not how accurate the robot is elsewhere."
@@ -266,8 +269,10 @@ def _result(report: Report) -> Section:
         )
         if rows
     ]
-    leads = [_lead(run, rows, kind, unit, held=held) for rows, kind, unit, _ in spreads if rows[0].robot == "before"]
-    part = "held-out" if held else "training"
+    leads = [
+        _lead(run, rows, kind, unit, held_out=held_out) for rows, kind, unit, _ in spreads if rows[0].robot == "before"
+    ]
+    part = "held-out" if held_out else "training"
     blocks += leads or [Alert("", f"The {part} part holds no reading to compare with.")]
     blocks.append(_lead_elsewhere(run))
     blocks += [spread_table(rows, words, unit) for rows, _, unit, words in spreads]
@@ -286,10 +291,11 @@ def _result(report: Report) -> Section:
     return Section("", blocks, "result")
 
 
-def _lead(run: Calibration, rows: Sequence[SpreadRow], kind: str, unit: str, *, held: bool) -> Lead:
+def _lead(run: Calibration, rows: Sequence[SpreadRow], kind: str, unit: str, *, held_out: bool) -> Lead:
     before, after = rows[:2]
     judged = (
-        f"{after.configurations} {'configurations that the fit has not seen' if held else 'training configurations'}"
+        f"{after.configurations} "
+        f"{'configurations that the fit has not seen' if held_out else 'training configurations'}"
     )
     words = ""
     if after.interval:
@@ -303,8 +309,8 @@ def _lead(run: Calibration, rows: Sequence[SpreadRow], kind: str, unit: str, *, 
         f"95 % of the readings are below {after.texts[2]} {unit} (before: {before.texts[2]} {unit}); the largest is "
         f"{after.texts[3]} {unit} (before: {before.texts[3]} {unit})."
     )
-    said = [Words(f"Mean {kind} error on the {judged}, before → after."), Words(words, quiet=True)]
-    return Lead(said, after.texts[0], before.texts[0], unit, kind)
+    lines = [Words(f"Mean {kind} error on the {judged}, before → after."), Words(words, quiet=True)]
+    return Lead(lines, after.texts[0], before.texts[0], unit, kind)
 
 
 def _lead_elsewhere(run: Calibration) -> Lead:
@@ -379,7 +385,7 @@ def _limits(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
 
 
 def _expected(run: Calibration, drawn: dict[str, Figure]) -> Section:
-    shared = " and from what readings of a visit share" if run.expected.remainder else ""
+    shared = " and from what readings of a visit share" if run.expected.by_joint_error else ""
     words = (
         "Error of the targets' positions to expect, in the robot's base frame, mean over the joint positions that "
         f"bring them into a cell. It follows from the covariance of the parameters{shared}, without the noise of a "
@@ -487,9 +493,9 @@ def _monte_carlo(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
     simulated = run.monte_carlo
     if simulated is None or "coverage" not in drawn:
         return []
-    said = lines_of([simulated_block(simulated, run.fit.robot)])[0]
+    sentence = lines_of([simulated_block(simulated, run.fit.robot)])[0]
     words = (
-        f"{said}. Each simulated calibration measures the calibrated robot again, with noise and "
+        f"{sentence}. Each simulated calibration measures the calibrated robot again, with noise and "
         "joint errors as they were found, and begins from a nominal robot that is off as the priors say "
         f"(seed {simulated.seed}). A dot is the share of them in which the linear interval of a "
         "parameter held the truth; where the intervals are right, 95 of 100 dots lie between the dotted lines."
@@ -501,13 +507,13 @@ def _monte_carlo(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
 
 
 def _correlations(fit: Fit, drawn: dict[str, Figure]) -> Section:
-    which = (
+    subject = (
         "free parameters"
         if fit.model.name == "frames"
         else "arm's free parameters, without base and targets, which go with the arm's ends in every calibration"
     )
     words = (
-        f"Between the estimates of the {which}. Strongly correlated parameters are known well only together; more "
+        f"Between the estimates of the {subject}. Strongly correlated parameters are known well only together; more "
         "varied configurations separate them."
     )
     blocks: list[Block] = [Words(words), Picture("correlations", drawn["correlations"])]

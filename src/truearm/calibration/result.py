@@ -33,13 +33,13 @@ from truearm.engine.choosing.zones import ZoneVerdict, flange_places
 from truearm.engine.command.reading import Excluded, excluded_block
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.curves import FoundCurve, found_curves
+from truearm.engine.diagnose.curves import FittedCurve, fitted_curves
 from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
 from truearm.engine.diagnose.expected_error import ExpectedError, expected_error
 from truearm.engine.diagnose.gain import NO_GAIN, Repeatability, repeatability
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
-from truearm.engine.document.document import Block, detail, each, held_by, leaves_of, say, under
+from truearm.engine.document.document import Block, detail, each, json_of, leaves_of, say, under
 from truearm.engine.document.records import Record
 from truearm.engine.document.summaries import error_line, errors_summary, expected_blocks, noise_blocks, selection_block
 from truearm.engine.document.tables import parameter_lines
@@ -94,8 +94,8 @@ class Calibration(Record):
         """The calibrated robot, base and targets included, with what the calibration knows about it."""
         training = self.data.of_configurations(self.training)
         proof = proof_of(self.fit, self.status, self.warnings, self.expected, training, self.known_before)
-        found = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
-        return sealed(found, proof)
+        calibrated = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
+        return sealed(calibrated, proof)
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -119,9 +119,9 @@ class Calibration(Record):
         return error_budget(self.fit, self.data, training, held_out, self.expected)
 
     @cached_property
-    def curves(self) -> tuple[FoundCurve, ...]:
+    def curves(self) -> tuple[FittedCurve, ...]:
         """The curves of the joints, where the model has some; see the effect ``joint-curve``."""
-        return found_curves(self.fit, self.data.of_configurations(self.training))
+        return fitted_curves(self.fit, self.data.of_configurations(self.training))
 
     @property
     def status(self) -> Status:
@@ -137,9 +137,9 @@ class Calibration(Record):
     @property
     def faults(self) -> tuple[str, ...]:
         """What keeps it from replacing a sound result: a bad status, errors and ``no-gain``, by their codes."""
-        told = [self.status.value] if self.status.value not in SOUND else []
-        told += [notice.code for notice in self.warnings if notice.level == "error" or notice.code == NO_GAIN.code]
-        return tuple(dict.fromkeys(told))
+        codes = [self.status.value] if self.status.value not in SOUND else []
+        codes += [notice.code for notice in self.warnings if notice.level == "error" or notice.code == NO_GAIN.code]
+        return tuple(dict.fromkeys(codes))
 
     @property
     def advice(self) -> str:
@@ -166,8 +166,8 @@ class Calibration(Record):
             )
             yield detail(f"On the {trained}:", after)
         yield say(nominal=errors_summary(self.nominal), train=errors_summary(self.train))
-        if self.fit.held:
-            yield detail(f"Held at known places: {listed(self.fit.held.words)}", held=list(self.fit.held.words))
+        if self.fit.fixed:
+            yield detail(f"Held at known places: {listed(self.fit.fixed.words)}", held=list(self.fit.fixed.words))
         if self.without:
             left_out = f"{counted(len(self.without), 'configuration')} ({listed(self.without)})"
             yield say(f"Left out: {left_out}", without=list(self.without))
@@ -175,7 +175,7 @@ class Calibration(Record):
             yield excluded_block(self.excluded)
         yield detail("" if self.advice or not sound else status, status=self.status.value)
         for leaf in leaves_of(self._further()):
-            yield replace(leaf, held={})
+            yield replace(leaf, in_json={})
         yield from expected_blocks(self.expected)
         if self.notes:
             yield say(notes=self.notes)
@@ -204,7 +204,7 @@ class Calibration(Record):
             "history": self.history,
             "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
             "parameters": list(self._parameters()),
-            **held_by(self._further()),
+            **json_of(self._further()),
         }
 
     def residuals(self) -> Residuals:
@@ -278,8 +278,8 @@ class Calibration(Record):
     @property
     def written(self) -> tuple[str, ...]:
         """Names of the files that are written: those of every calibration, and of the zones that are kept."""
-        kept = [] if self.zones is None else [robot_file_of(verdict.box.name) for verdict in self.zones.kept]
-        return (*RESULT_FILES, *([ZONES_FILE] if kept else []), *kept)
+        zone_names = [] if self.zones is None else [robot_file_of(verdict.box.name) for verdict in self.zones.kept]
+        return (*RESULT_FILES, *([ZONES_FILE] if zone_names else []), *zone_names)
 
     def zone_robot(self, verdict: ZoneVerdict) -> Robot:
         """Return the calibrated robot of a zone, with what is known about it.
@@ -293,8 +293,8 @@ class Calibration(Record):
         if fit is None or self.zones is None:
             raise InputError("this zone has no model of its own", parameter="verdict", came=verdict.box.name)
         training = self.data.of_configurations(self.training)
-        mine = np.flatnonzero(verdict.box.holds(flange_places(self.fit.start, training.postures), self.zones.overlap))
-        part = training.of_configurations(mine)
+        inside = np.flatnonzero(verdict.box.holds(flange_places(self.fit.start, training.postures), self.zones.overlap))
+        part = training.of_configurations(inside)
         proof = proof_of(fit, fit.status, self.warnings, expected_error(fit), part, self.known_before)
         line = f"{self.history}, zone {verdict.box.name}"
         return sealed(replace(fit.robot, history=(*fit.robot.history, line), tools={}, truths={}), proof)

@@ -97,11 +97,11 @@ def _verdict_block(verdict: ZoneVerdict) -> Block:
 
 
 def _words(verdict: ZoneVerdict) -> str:
-    kept = "kept" if verdict.kept else "not kept"
+    state = "kept" if verdict.kept else "not kept"
     if verdict.whole is None or verdict.zone is None or verdict.error is None:
-        return f"{kept}, {verdict.why}"
+        return f"{state}, {verdict.why}"
     return (
-        f"{kept}, {millimetres(verdict.zone)} instead of {millimetres(verdict.whole)} mm on "
+        f"{state}, {millimetres(verdict.zone)} instead of {millimetres(verdict.whole)} mm on "
         f"{counted(verdict.held_out, 'held-out configuration')} (difference good to {millimetres(verdict.error)} mm), "
         f"{verdict.why}"
     )

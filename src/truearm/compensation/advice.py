@@ -64,15 +64,15 @@ def check_correction(
         splits: How their moves are split, one a program; empty if they are not.
     """
     corrections = result.corrections
-    made = _corrected(result)
+    notices = _corrected(result)
     skipped = sum(len(correction.skipped) for correction in corrections)
     if skipped:
-        made.append(TARGETS_SKIPPED(f"{_counted(skipped, 'target')} left unchanged, as listed with the reason."))
-    made += [*_not_better(robot, result), *_beyond(robot, result)]
+        notices.append(TARGETS_SKIPPED(f"{_counted(skipped, 'target')} left unchanged, as listed with the reason."))
+    notices += [*_not_better(robot, result), *_beyond(robot, result)]
     unknown: Counter[str] = sum((Counter(correction.program.unknown) for correction in corrections), Counter())
     if unknown:
         words = ", ".join(f"{word} ({number})" for word, number in unknown.most_common(_LISTED))
-        made.append(
+        notices.append(
             INSTRUCTIONS_UNKNOWN(
                 f"{_counted(sum(unknown.values()), 'unknown instruction')} left alone: {words}"
                 f"{', ..' if len(unknown) > _LISTED else ''}. If one of them moves the robot, its targets stay."
@@ -80,7 +80,7 @@ def check_correction(
         )
     edges = [(correction, row) for correction in corrections for row in correction.on_edge]
     if edges:
-        made.append(
+        notices.append(
             CONFIGURATION_ON_EDGE(
                 f"{_counted(len(edges), 'target')} moved across the edge of a quadrant or turn of the configuration "
                 f"by a joint that stands on it, as at 0: {_lines(edges)}. Controllers "
@@ -88,7 +88,7 @@ def check_correction(
             )
         )
     if result.guessed:
-        made.append(
+        notices.append(
             POSTURE_GUESSED(
                 f"Nothing says in which posture the robot reaches its first pose ({'; '.join(result.guessed)}): it was "
                 "taken as the first that can be reached of front-up-noflip and so on, and the next as near as can be."
@@ -96,19 +96,19 @@ def check_correction(
         )
     unsplit = sum(len(split.unsplit) for split in splits)
     if unsplit:
-        made.append(
+        notices.append(
             MOVES_NOT_DIVIDED(
                 f"{_counted(unsplit, 'straight or circular move')} not split: the start of such a move is not sure; or "
                 "a target was not corrected, is given by joints or is an offset; or the posture changes on the way; or "
                 f"{MOST_SEGMENTS} segments are not enough; or its instruction has options that segments cannot have."
             )
         )
-    made += _loads(robot, result)
-    made += _apart(result)
+    notices += _loads(robot, result)
+    notices += _apart(result)
     if any(correction.program.load_changes for correction in corrections) and any(
         effect.loaded for effect in robot.effects
     ):
-        made.append(
+        notices.append(
             LOAD_CHANGES(
                 "The programs change what the robot carries (GripLoad, TLoad, tload). Targets were corrected for the "
                 "load of the tool alone; where the robot carries more, the arm bends further than is expected here."
@@ -116,12 +116,12 @@ def check_correction(
         )
     unweighed = not result.loads or None in result.loads.values()
     if robot.payload == NO_PAYLOAD and unweighed and any(effect.loaded for effect in robot.effects):
-        made.append(
+        notices.append(
             CARRIES_NOTHING(
                 "The robot carries nothing in this correction. If its tool weighs something, give it with `payload`."
             )
         )
-    return tuple(made)
+    return tuple(notices)
 
 
 NO_TARGETS: Final = Rule("no-targets", "warning", "the programs hold nothing to correct", gravity=2)
@@ -133,8 +133,8 @@ def _corrected(result: CorrectedPrograms) -> list[Notice]:
     if not any(correction.program.targets for correction in corrections):
         return [NO_TARGETS("There is no target in the programs that could be corrected.")]
     alone = sum(why == ALONE for correction in corrections for why in correction.kept.values())
-    made = _assumed(result) if any(correction.corrected.any() for correction in corrections) else _nothing(alone)
-    return made + _by_joints(corrections)
+    notices = _assumed(result) if any(correction.corrected.any() for correction in corrections) else _nothing(alone)
+    return notices + _by_joints(corrections)
 
 
 NOT_BETTER_HERE: Final = Rule(
@@ -147,17 +147,21 @@ def _not_better(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     every = [(correction, row) for correction in result.corrections for row in correction.not_better]
     if not every:
         return []
-    alone = [(one, row) for one, row in every if one.expected is not None and one.expected.worse[row] > LIKELY]
-    kept = [(one, row) for one, row in every if not one.corrected[row]]
-    corrected = len(every) - len(kept)
+    alone = [
+        (correction, row)
+        for correction, row in every
+        if correction.expected is not None and correction.expected.worse[row] > LIKELY
+    ]
+    unchanged = [(correction, row) for correction, row in every if not correction.corrected[row]]
+    corrected = len(every) - len(unchanged)
     share = f"{LIKELY:.0%}".replace("%", " %")
     words = (
         f"For {counted(len(alone), 'target')} the correction makes the real error larger with a probability above "
         f"{share}: {_lines(alone)}. "
     )
-    if kept:
-        joined = len(kept) + corrected - len(alone)
-        words += f"{counted(len(kept), 'target')} {'stays' if len(kept) == 1 else 'stay'} as before"
+    if unchanged:
+        joined = len(unchanged) + corrected - len(alone)
+        words += f"{counted(len(unchanged), 'target')} {'stays' if len(unchanged) == 1 else 'stay'} as before"
         words += f", {joined} of them because straight moves join them to the others" if joined else ""
         words += f"; a path may have a step of up to {LARGEST_STEP * 1e3:g} mm there. "
     if corrected:
@@ -182,7 +186,7 @@ def _flange_counts(result: CorrectedPrograms) -> bool:
         for correction in result.corrections
         if correction.expected is not None
     ]
-    turns = np.concatenate([one.before[rows, :3, :3] for one, rows in judged])
+    turns = np.concatenate([correction.before[rows, :3, :3] for correction, rows in judged])
     alike = result.frames.frames == "assumed" and np.allclose(turns, turns[0], atol=_TURNED)
     return result.frames.tools == "assumed" and not alike
 
@@ -198,17 +202,17 @@ BEYOND_MEASURED: Final = Rule(
 
 def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     """Say which targets are reached with joint positions that calibration has not seen."""
-    found = [
+    beyond = [
         (correction, row)
         for correction in result.corrections
         for row in np.flatnonzero(correction.corrected & beyond_measured(robot, correction.joints).any(axis=1)).tolist()
     ]
-    if not found:
+    if not beyond:
         return []
     return [
         BEYOND_MEASURED(
-            f"{_counted(len(found), 'target')} corrected although {_joints_beyond(robot, found)} stood well outside "
-            f"the range measured in calibration: {_lines(found)}. What the model leaves out counts more there than "
+            f"{_counted(len(beyond), 'target')} corrected although {_joints_beyond(robot, beyond)} stood well outside "
+            f"the range measured in calibration: {_lines(beyond)}. What the model leaves out counts more there than "
             "where it was measured."
         )
     ]
@@ -216,12 +220,12 @@ def _beyond(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
 
 def _joints_beyond(robot: Robot, targets: Sequence[tuple[Correction, int]]) -> str:
     """Return the joints that are at some targets well beyond what was measured."""
-    beyond = beyond_measured(robot, np.array([one.joints[row] for one, row in targets]))
+    beyond = beyond_measured(robot, np.array([correction.joints[row] for correction, row in targets]))
     return listed([robot.joints[number].name for number in np.flatnonzero(beyond.any(axis=0)).tolist()])
 
 
 def _lines(targets: Sequence[tuple[Correction, int]]) -> str:
-    shown = [(one.program.sources, one.program.targets[row]) for one, row in targets[:_LISTED]]
+    shown = [(correction.program.sources, correction.program.targets[row]) for correction, row in targets[:_LISTED]]
     lines = ", ".join(f"{sources[target.source].path.name} line {target.line}" for sources, target in shown)
     return f"{lines}{', ..' if len(targets) > _LISTED else ''}"
 
@@ -243,13 +247,13 @@ JOINT_TARGETS_KEPT: Final = Rule("joint-targets-kept", "note", "targets given by
 
 
 def _by_joints(corrections: Sequence[Correction]) -> list[Notice]:
-    kept = sum(why == "given by joints" for correction in corrections for why in correction.kept.values())
-    if not kept:
+    unchanged = sum(why == "given by joints" for correction in corrections for why in correction.kept.values())
+    if not unchanged:
         return []
-    stay = "is given by joints and stays as it is" if kept == 1 else "are given by joints and stay as they are"
+    stay = "is given by joints and stays as it is" if unchanged == 1 else "are given by joints and stay as they are"
     return [
         JOINT_TARGETS_KEPT(
-            f"{counted(kept, 'target')} {stay}, as home positions should. Where one was computed from a place in "
+            f"{counted(unchanged, 'target')} {stay}, as home positions should. Where one was computed from a place in "
             "space, `joint_targets=correct` corrects it too."
         )
     ]
@@ -271,19 +275,19 @@ def _loads(robot: Robot, result: CorrectedPrograms) -> list[Notice]:
     others = [tool or "the flange" for tool, load in result.loads.items() if load is None]
     own = robot.payload.mass
     other = any(abs(load.mass - own) > _SAME_MASS * max(load.mass, own) for load in result.loads.values() if load)
-    said = [f"The programs say what their tools weigh: {', '.join(weighed)}."] if weighed else []
+    sentences = [f"The programs say what their tools weigh: {', '.join(weighed)}."] if weighed else []
     if others:
-        said.append(
+        sentences.append(
             f"No mass is known of {listed(others)}: there the {robot.payload.mass:g} kg of the calibration are kept."
         )
-    said.append("`payload` says it for all of them.")
+    sentences.append("`payload` says it for all of them.")
     if not other:
-        return [LOADS_TAKEN(" ".join(said), "note")]
-    said.append(
+        return [LOADS_TAKEN(" ".join(sentences), "note")]
+    sentences.append(
         f"In its calibration the robot carried {own:g} kg. If it carried one of these tools then, that payload was "
         "wrong: calibration and programs are off by what it bends, and the errors to expect do not contain that."
     )
-    return [LOADS_TAKEN(" ".join(said))]
+    return [LOADS_TAKEN(" ".join(sentences))]
 
 
 TOOL_APART: Final = Rule(
@@ -316,17 +320,17 @@ FRAMES_ASSUMED: Final = Rule(
 
 
 def _assumed(result: CorrectedPrograms) -> list[Notice]:
-    made = []
+    notices = []
     frames, words = result.frames, frame_words(result)
     if frames.frames == "assumed" and not result.choice.was_taught("points"):
         few = [number for number in _targets_by_shift(result) if number <= _FEW_TARGETS]
         if few:
             words[0] += f" With so few targets ({min(few)}) little or nothing of the correction is left: give `frames`."
         if few or not result.choice.was_taught("frames"):
-            made.append(FRAMES_ASSUMED(words[0]))
+            notices.append(FRAMES_ASSUMED(words[0]))
     if frames.tools == "assumed" and not result.choice.was_taught("tools"):
-        made.append(TOOLS_ASSUMED(words[-1]))
-    return made
+        notices.append(TOOLS_ASSUMED(words[-1]))
+    return notices
 
 
 def _targets_by_shift(result: CorrectedPrograms) -> list[int]:
@@ -349,25 +353,25 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
         return f"{np.linalg.norm(shift[:3, 3]) * 1e3:.3f} mm and {turned:.4f} deg"
 
     if frames.frames == "held":
-        said = [
+        sentences = [
             "The calibration held the base, so it is known where the program's frames are: where the controller has "
             "them. Targets are corrected in them, and may all move together."
         ]
     elif frames.frames == "identified":
-        said = [
+        sentences = [
             "The program's frames are where `frames` places them; targets are corrected in them, and may all move "
             "together."
         ]
     elif result.choice.was_taught("points"):
-        said = ["The points were taught, and stay. Offsets from them are corrected to be as long as they say."]
+        sentences = ["The points were taught, and stay. Offsets from them are corrected to be as long as they say."]
     elif result.choice.was_taught("frames"):
-        said = [
+        sentences = [
             "The frames were taught with this robot. So in each of them the base was shifted until the corrections of "
             "its targets have no shift and no turn in common: they are right to each other, and their pattern stays "
             "where it was taught."
         ]
     else:
-        said = [
+        sentences = [
             "No frame has a measured place (`frames`). Calibration cannot know where a program's frames really are, so "
             f"the base was shifted by {size(frames.base)} until the corrections of all targets have no shift and no "
             "turn in common: targets are right to each other, and the pattern of their positions stays where it was. A "
@@ -376,26 +380,26 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
             "give `frames`."
         ]
     if frames.tools == "identified":
-        said.append("The program's tools are where `tools` places them, on the identified flange.")
+        sentences.append("The program's tools are where `tools` places them, on the identified flange.")
     elif frames.tools == "held":
-        said.append(
+        sentences.append(
             "The calibration held targets on the flange, so the program's tools are where the controller has them."
         )
     else:
-        given = (
+        assumption = (
             "The tools were taught with this robot"
             if result.choice.was_taught("tools")
             else "No tool has a measured place (`tools`)"
         )
-        said.append(
-            f"{given}. The program's tools are taken to sit on a flange that agrees best with the nominal one all over "
-            f"the workspace, {size(frames.flange)} from the identified one."
+        sentences.append(
+            f"{assumption}. The program's tools are taken to sit on a flange that agrees best with the nominal one all "
+            f"over the workspace, {size(frames.flange)} from the identified one."
         )
         if any(correction.expected is not None for correction in result.corrections):
-            said[-1] += " No reading tells where it really is; the errors to expect contain that."
-    return said
+            sentences[-1] += " No reading tells where it really is; the errors to expect contain that."
+    return sentences
 
 
-def _counted(number: int, what: str) -> str:
+def _counted(number: int, noun: str) -> str:
     """Return that so many were: ``1 target was``, ``2 targets were``."""
-    return f"{number} {what}{' was' if number == 1 else 's were'}"
+    return f"{number} {noun}{' was' if number == 1 else 's were'}"

@@ -79,7 +79,7 @@ _SHOWN: Final = 5
 
 
 @dataclass(frozen=True, eq=False)
-class _Given:
+class _Settings:
     """What was given beside the programs, as it was read."""
 
     calibrated: Robot  #: As its controller computes.
@@ -105,7 +105,7 @@ class _Read:
 
 
 @dataclass(frozen=True, eq=False)
-class _Made:
+class _Corrections:
     """How the programs are corrected."""
 
     result: CorrectedPrograms
@@ -117,48 +117,48 @@ class _Made:
 
 def corrected(asked: Compensate) -> ProgramCorrection:
     """Correct programs, and write them."""
-    given = _given(asked)
-    read = _read(asked, given)
-    made = _made(asked, given, read)
+    settings = _settings(asked)
+    read = _read(asked, settings)
+    corrections = _corrections(asked, settings, read)
     day = day_of(asked.notes or {})
-    arm = given.arm
+    arm = settings.arm
     correction = ProgramCorrection(
         robot=arm,
-        files=_corrected_files(given, read, made, day),
-        result=made.result,
-        splits=made.splits,
+        files=_corrected_files(settings, read, corrections, day),
+        result=corrections.result,
+        splits=corrections.splits,
         warnings=(
             *changed_since(asked.robot),
             *known_of(arm),
             *read.foreign,
             *controller_notices(arm, read.programs),
-            *_payloads_unlikely(arm, made.result),
-            *check_force(made.result.pushed),
-            *made.accepted,
-            *check_correction(arm, made.result, made.splits),
-            *made.unremembered,
+            *_payloads_unlikely(arm, corrections.result),
+            *check_force(corrections.result.pushed),
+            *corrections.accepted,
+            *check_correction(arm, corrections.result, corrections.splits),
+            *corrections.unremembered,
         ),
         command=asked.command or asked.as_python(),
-        inputs=files_of(asked.robot, asked.tools, asked.frames, asked.wrench_file, *given.kinematics),
-        hashes=given.hashes,
+        inputs=files_of(asked.robot, asked.tools, asked.frames, asked.wrench_file, *settings.kinematics),
+        hashes=settings.hashes,
         notes=dict(asked.notes or {}),
         date=day.isoformat(),
-        ledger=made.ledger,
+        ledger=corrections.ledger,
     )
-    if given.folder is not None:
+    if settings.folder is not None:
         with refusals_of("out"):
-            correction.save(given.folder, asked.progress)
+            correction.save(settings.folder, asked.progress)
     return correction
 
 
-def _given(asked: Compensate) -> _Given:
+def _settings(asked: Compensate) -> _Settings:
     """Read the robot, and what is said of the cell and of the correction."""
     wrench_file = asked.wrench_file
     pushed = None if wrench_file is not None else wrench_argument(asked.wrench, asked.wrench_frame)
     answers = read_answers({"tools": _path(asked.tools), "frames": _path(asked.frames)})
-    said, said_by = asked.controller_kinematics, "controller_kinematics"
-    if said is None:
-        said, said_by = answers.controller_kinematics, "tools, frames"
+    stated, parameter = asked.controller_kinematics, "controller_kinematics"
+    if stated is None:
+        stated, parameter = answers.controller_kinematics, "tools, frames"
     taught = asked.taught
     if taught is None and answers.taught is not None:
         taught = dict(asked.options())["taught"].kind.check(answers.taught, "taught")
@@ -166,9 +166,9 @@ def _given(asked: Compensate) -> _Given:
         joint_targets=asked.joint_targets == "correct",
         only=tuple(asked.only),
         keep=tuple(asked.keep),
-        taught=None if taught is None else frozenset(what for what in TAUGHT if what in taught),
+        taught=None if taught is None else frozenset(kind for kind in TAUGHT if kind in taught),
     )
-    kinematics = kinematics_file(said)
+    kinematics = kinematics_file(stated)
     read = (asked.robot, asked.tools, asked.frames, wrench_file, *kinematics)
     folder = None if asked.out is None else folder_for((REPORT,), asked.out, *read, *asked.programs)
     hashes = hashes_of(
@@ -181,7 +181,7 @@ def _given(asked: Compensate) -> _Given:
     allowed = None
     if asked.accept_correction is not None:
         allowed = CorrectionLimit.of(asked.accept_correction, "accept_correction")
-    calibrated = with_controller(robot_argument(asked.robot), said, said_by)
+    calibrated = with_controller(robot_argument(asked.robot), stated, parameter)
     arm = asked.loads.on(calibrated)
     if arm.wrench is not None:
         raise InputError(
@@ -193,16 +193,16 @@ def _given(asked: Compensate) -> _Given:
     accepted = accept_argument(asked.accept, arm)
     refuse_unaccepted(arm, accepted)
     acting = _wrenches(arm, pushed, wrench_file)
-    return _Given(calibrated, arm, kinematics, choice, allowed, accepted, acting, folder, hashes)
+    return _Settings(calibrated, arm, kinematics, choice, allowed, accepted, acting, folder, hashes)
 
 
-def _path(given: str | Path | None) -> Path | None:
-    return None if given is None else Path(given)
+def _path(value: str | Path | None) -> Path | None:
+    return None if value is None else Path(value)
 
 
-def _read(asked: Compensate, given: _Given) -> _Read:
+def _read(asked: Compensate, settings: _Settings) -> _Read:
     """Read the programs, tools and frames, and refuse what is not known well enough of them."""
-    arm = given.arm
+    arm = settings.arm
     with refusals_of("programs"):
         files = program_files([*map(Path, asked.programs)], again=asked.again)
         asked.progress("reading the programs")
@@ -217,31 +217,31 @@ def _read(asked: Compensate, given: _Given) -> _Read:
     for path, parameter in ((tool_file, "tools"), (frame_file, "frames")):
         if path != asked.wrench_file:
             refuse_wrenches_left_out(path, parameter)
-    _refuse_taught_and_measured(given.choice, cell)
-    foreign = check_maker(arm, language, given.accepted)
+    _refuse_taught_and_measured(settings.choice, cell)
+    foreign = check_maker(arm, language, settings.accepted)
     refuse_proprietary_controller(arm, programs)
-    refuse_unanswered([taught_question(programs, given.choice), controller_question(arm, programs)])
+    refuse_unanswered([taught_question(programs, settings.choice), controller_question(arm, programs)])
     with refusals_of("robot"):
-        refuse_kinematics_of_another_arm(arm, given.accepted)
+        refuse_kinematics_of_another_arm(arm, settings.accepted)
     return _Read(tuple(files), programs, language, cell, tuple(foreign))
 
 
-def _made(asked: Compensate, given: _Given, read: _Read) -> _Made:
+def _corrections(asked: Compensate, settings: _Settings, read: _Read) -> _Corrections:
     """Correct the programs, and refuse what the robot's errors do not explain, or what would harm."""
-    accepted, language = given.accepted, read.language
+    accepted, language = settings.accepted, read.language
     with refusals_of("robot"):
         result = corrected_programs(
-            given.arm,
+            settings.arm,
             read.programs,
             read.cell,
             asked.progress,
-            choice=replace(given.choice, every=NOT_BETTER in accepted),
+            choice=replace(settings.choice, every=NOT_BETTER in accepted),
             weigh_tools=asked.payload is None,
-            wrenches=given.acting,
+            wrenches=settings.acting,
         )
-    refuse_corrected_already(result, [*map(Path, asked.programs)], given.folder, ledger_of(asked.robot))
+    refuse_corrected_already(result, [*map(Path, asked.programs)], settings.folder, ledger_of(asked.robot))
     ledger, unremembered = ledger_to_write(ledger_of(asked.robot))
-    large = _check_size(result, correction_limit(given.calibrated), given.allowed)
+    large = _check_size(result, correction_limit(settings.calibrated), settings.allowed)
     if SKIPPED not in accepted:
         _refuse_skipped(result)
     read_by_program = _check_numbers_read(language, result, accepted)
@@ -252,26 +252,28 @@ def _made(asked: Compensate, given: _Given, read: _Read) -> _Made:
             split_program(language, correction, between, asked.split)
             for correction, between in zip(result.corrections, result.between, strict=True)
         )
-    return _Made(result, splits, ledger, tuple(unremembered), (*large, *read_by_program))
+    return _Corrections(result, splits, ledger, tuple(unremembered), (*large, *read_by_program))
 
 
-def _corrected_files(given: _Given, read: _Read, made: _Made, day: date) -> tuple[FileCorrection, ...]:
+def _corrected_files(
+    settings: _Settings, read: _Read, corrections: _Corrections, day: date
+) -> tuple[FileCorrection, ...]:
     """Return the files with their new texts, in the order in which they were given."""
-    arm = given.arm
-    comment = correction_comment(day, arm.name, given.hashes.get("robot", ""))
+    arm = settings.arm
+    comment = correction_comment(day, arm.name, settings.hashes.get("robot", ""))
     comment += (IN_PROGRAMS,) if arm.simulated else ()
     bounded = arm.proof is not None and arm.proof.lower_bound
-    found = []
-    for number, correction in enumerate(made.result.corrections):
-        edits = _edits(correction, made.splits[number] if made.splits else None)
+    files = []
+    for number, correction in enumerate(corrections.result.corrections):
+        edits = _edits(correction, corrections.splits[number] if corrections.splits else None)
         for index, source in enumerate(correction.program.sources):
             file = next(file for file in read.files if file.path == source.path)
             text = edited(source.text, [edit for edit in edits if edit.source == index])
             if text != source.text:
                 text = read.language.comment(text, comment)
-            relative = made.result.relative
-            found.append(FileCorrection(file, correction, index, text.encode("latin-1"), relative, bounded))
-    return tuple(sorted(found, key=lambda one: read.files.index(one.file)))
+            relative = corrections.result.relative
+            files.append(FileCorrection(file, correction, index, text.encode("latin-1"), relative, bounded))
+    return tuple(sorted(files, key=lambda corrected_file: read.files.index(corrected_file.file)))
 
 
 def _wrenches(arm: Robot, pushed: Wrench | None, file: Path | None) -> tuple[TargetWrench, ...]:
@@ -295,49 +297,49 @@ def _payloads_unlikely(arm: Robot, result: CorrectedPrograms) -> list[Notice]:
 def _refuse_taught_and_measured(choice: Choice, cell: Cell) -> None:
     """Refuse tools or frames that are said to be taught and have a measured place; what the controller has is none."""
     kinds: tuple[tuple[Taught, dict[str, Placed]], ...] = (("tools", cell.tools), ("frames", cell.frames))
-    for what, places in kinds:
+    for kind, places in kinds:
         measured = [name for name, placed in places.items() if placed.identified is not None]
-        if measured and choice.was_taught(what):
+        if measured and choice.was_taught(kind):
             raise InputError(
-                f"the {what} cannot be both taught and measured",
-                parameter=f"taught, {what}",
-                came=measured[0] or ("flange" if what == "tools" else "base"),
-                cure=f"Leave {what} out of `taught`, or say with `of: controller` what the controller has.",
+                f"the {kind} cannot be both taught and measured",
+                parameter=f"taught, {kind}",
+                came=measured[0] or ("flange" if kind == "tools" else "base"),
+                cure=f"Leave {kind} out of `taught`, or say with `of: controller` what the controller has.",
             )
 
 
 def _check_size(result: CorrectedPrograms, limit: CorrectionLimit, accepted: CorrectionLimit | None) -> list[Notice]:
     """Refuse corrections that errors of the robot do not explain, or say that they were accepted."""
     rows = [(correction, np.flatnonzero(correction.corrected)) for correction in result.corrections]
-    targets = [one.program.targets[row] for one, some in rows for row in some.tolist()]
-    programs = [one.program for one, some in rows for _ in some]
-    given = [name for name in ("frames", "tools") if getattr(result.frames, name) == "identified"]
+    targets = [correction.program.targets[row] for correction, some in rows for row in some.tolist()]
+    programs = [correction.program for correction, some in rows for _ in some]
+    identified = [name for name in ("frames", "tools") if getattr(result.frames, name) == "identified"]
     if result.frames.frames == "assumed":
         bases = np.array([*result.frames.bases.values()]).reshape(-1, 4, 4)
         turns = np.linalg.norm(turns_between(np.broadcast_to(np.eye(4), bases.shape), bases), axis=1)
         limit = limit.beside(float(turns.max(initial=0.0)))
-    shared = shared_motion([one.motions(some) for one, some in rows])
+    shared = shared_motion([correction.motions(some) for correction, some in rows])
     common = ""
     if shared is not None and result.frames.frames != "assumed":
         common = f"All targets share a shift of {shared.moved * 1e3:.2f} mm. "
     return check_size(
-        np.concatenate([one.moved[some] for one, some in rows]),
-        np.concatenate([one.turned[some] for one, some in rows]),
+        np.concatenate([correction.moved[some] for correction, some in rows]),
+        np.concatenate([correction.turned[some] for correction, some in rows]),
         limit,
         accepted,
         where=lambda row: place(programs[row], targets[row]),
         check=f"{common}Check where frame and tool were measured and how they are turned (a target that is a point "
         "does not say it), the numbers that the controller has for them, units, conventions of angles, and the load.",
-        parameter=", ".join(given) or "programs",
+        parameter=", ".join(identified) or "programs",
     )
 
 
 def _refuse_skipped(result: CorrectedPrograms) -> None:
     """Refuse a program that would be corrected in part."""
     skipped = [
-        f"{correction.program.sources[one.source].where(one.line)}: {one.reason}"
+        f"{correction.program.sources[target.source].where(target.line)}: {target.reason}"
         for correction in result.corrections
-        for one in correction.skipped
+        for target in correction.skipped
     ]
     if skipped:
         more = f"; and {len(skipped) - _SHOWN} more" if len(skipped) > _SHOWN else ""
@@ -388,9 +390,9 @@ def reverted(asked: Revert) -> RestoredPrograms:
     paths = [*map(Path, asked.programs)]
     folder = None if asked.out is None else folder_for((path.name for path in paths), asked.out, *paths)
     with refusals_of("programs"):
-        made = RestoredPrograms(restored(paths))
+        result = RestoredPrograms(restored(paths))
     if folder is None:
-        return made
+        return result
     with refusals_of("out"):
-        made.save(folder)
-    return replace(made, folder=folder)
+        result.save(folder)
+    return replace(result, folder=folder)

@@ -100,8 +100,8 @@ def corrected(
     """
     tip, wanted = Tip(robot, target), _desired(motion, desired)
     length = reach(robot, target)
-    kept = np.eye(3) if rotation is None else rotation
-    rows = chosen_rows(orientation, kept, length)
+    planned = np.eye(3) if rotation is None else rotation
+    rows = chosen_rows(orientation, planned, length)
     joints = best = motion.joints
     before = after = np.zeros(0)
     rounds = 0
@@ -113,7 +113,7 @@ def corrected(
             before = after = distance
         nearer = distance < after
         best, after = np.where(nearer[:, None], joints, best), np.where(nearer, distance, after)
-        turned = _turned(orientation, kept, state.rotation)
+        turned = _turned(orientation, planned, state.rotation)
         missed = np.concatenate([error, turned], axis=1) @ rows.T
         if (np.linalg.norm(missed, axis=1) * length <= AGREED).all() or rounds == _MOST_ROUNDS:
             break
@@ -124,12 +124,12 @@ def corrected(
     return JointCorrection(best, best - motion.joints, before, after, rounds)
 
 
-def _turned(orientation: Orientation, kept: Array, rotation: Array) -> Array:
+def _turned(orientation: Orientation, planned: Array, rotation: Array) -> Array:
     """Return by how much tips ``(n, 3, 3)`` are turned from the orientation to keep, ``(n, 3)`` [rad]."""
     if orientation == "full":
-        return rotation_vector(rotation @ kept.T)
+        return rotation_vector(rotation @ planned.T)
     if orientation == "axis":
-        return np.asarray(np.cross(np.broadcast_to(kept[:, 2], (len(rotation), 3)), rotation[:, :, 2]))
+        return np.asarray(np.cross(np.broadcast_to(planned[:, 2], (len(rotation), 3)), rotation[:, :, 2]))
     return np.zeros((len(rotation), 3))
 
 
@@ -268,21 +268,23 @@ def correct_path(robot: Robot, planned: PlannedPath, seed: ArrayLike | None = No
     _check_speeds(robot, motion, planned)
     real = place.real
     desired = _moved(place.to_real, planned.trajectory.position)
-    kept = place.to_real[:3, :3] @ planned.rotation
+    desired_rotation = place.to_real[:3, :3] @ planned.rotation
     joints: dict[Knowledge, Array] = {"nothing": motion.joints}
     if known:
         for name, model, moving in _models(real, motion):
-            joints[name] = corrected(model, moving, desired, TIP, orientation=planned.orientation, rotation=kept).joints
+            joints[name] = corrected(
+                model, moving, desired, TIP, orientation=planned.orientation, rotation=desired_rotation
+            ).joints
     tip = Tip(real, TIP)
-    found = {name: tip.positions(motion.postures(values)) for name, values in joints.items()}
+    reached = {name: tip.positions(motion.postures(values)) for name, values in joints.items()}
     back = np.asarray(np.linalg.inv(place.to_real), float)
     best = joints[[name for name in KNOWLEDGE if name in joints][-1]]
     return CorrectedPath(
         planned,
         motion,
         joints,
-        {name: np.linalg.norm(at - desired, axis=1) for name, at in found.items()},
-        {name: _moved(back, at) for name, at in found.items()},
+        {name: np.linalg.norm(at - desired, axis=1) for name, at in reached.items()},
+        {name: _moved(back, at) for name, at in reached.items()},
         _loads(real, motion, best),
         place.nominal,
     )
@@ -446,14 +448,14 @@ def path_program(path: CorrectedPath, robot: Robot, name: str, *, targets: Targe
 def _chosen(time: Array, section: NDArray[np.intp], spacing: float) -> NDArray[np.intp]:
     """Return the samples that become targets: the first, the ends of sections, and others about `spacing` apart."""
     ends = [*np.flatnonzero(np.diff(section)).tolist(), len(time) - 1]
-    kept = [0]
+    chosen = [0]
     for end in ends:
-        first = kept[-1]
+        first = chosen[-1]
         pieces = min(max(1, math.ceil(float(time[end] - time[first]) / spacing - 1e-6)), end - first)
         wanted = np.linspace(time[first], time[end], pieces + 1)[1:]
         rows = first + 1 + np.abs(time[first + 1 : end + 1, None] - wanted).argmin(axis=0)
-        kept += np.unique(rows).tolist()
-    return np.array(kept)
+        chosen += np.unique(rows).tolist()
+    return np.array(chosen)
 
 
 def _beside(path: CorrectedPath, rows: NDArray[np.intp], *, straight: bool) -> float:

@@ -60,22 +60,22 @@ def beyond_measured(robot: Robot, joints: Array) -> NDArray[np.bool_]:
 # A controller that has kinematics of its own, measured by its maker, goes elsewhere with a pose than the table of the
 # robot file says. Correcting against that table then adds what the controller corrects already. Targets that are given
 # by joints do not pass through the kinematics.
-_KEPT: Final = (
+_ANSWER_STAYS_IN: Final = (
     "The robot file keeps the answer (controller: {{kinematics: {0}}}), or a cell file (controller_kinematics: {0})."
 )
 
 
-def with_controller(arm: Robot, said: str | Path | None, said_by: str) -> Robot:
+def with_controller(arm: Robot, stated: str | Path | None, parameter: str) -> Robot:
     """Return a robot with what was said of its controller's kinematics, and by which parameter; None for nothing."""
-    if said is None:
+    if stated is None:
         return arm
-    with refusals_of(said_by):
-        return with_controller_kinematics(arm, str(path_argument(said, said_by)), Path())
+    with refusals_of(parameter):
+        return with_controller_kinematics(arm, str(path_argument(stated, parameter)), Path())
 
 
-def kinematics_file(said: str | Path | None) -> tuple[str | Path, ...]:
+def kinematics_file(stated: str | Path | None) -> tuple[str | Path, ...]:
     """Return the file that was named for a controller's kinematics, if there is one."""
-    return () if said is None or str(said) in STATED else (said,)
+    return () if stated is None or str(stated) in STATED else (stated,)
 
 
 def refuse_proprietary_controller(robot: Robot, programs: Sequence[Program]) -> None:
@@ -116,14 +116,14 @@ def controller_question(robot: Robot, programs: Sequence[Program]) -> Question |
             "the factory measured of each arm; corrected against the data sheet, the poses would become worse.",
             "`controller_kinematics` and the file calibration.conf from the folder .urcontrol of the controller, or "
             f"that of the ROS driver; or with {answers}",
-            _KEPT.format("calibration.conf"),
+            _ANSWER_STAYS_IN.format("calibration.conf"),
         )
     return Question(
         "controller_kinematics",
         f"Does this controller have {calibration.name}? {calibration.maker} delivers it where it was ordered. A "
         "controller that has it corrects the poses once more, and the program becomes worse.",
         answers,
-        _KEPT.format("nominal"),
+        _ANSWER_STAYS_IN.format("nominal"),
     )
 
 
@@ -138,7 +138,7 @@ def refuse_kinematics_of_another_arm(robot: Robot, accepted: Collection[str]) ->
     if robot.controller.kinematics.kind != "own" or OTHER_ARM in accepted:
         return
     table = replace(robot, controller=replace(robot.controller, kinematics=ControllerKinematics("nominal")))
-    own, sheet = (disagreement(robot, nominal_robot(one)) for one in (robot, table))
+    own, sheet = (disagreement(robot, nominal_robot(arm)) for arm in (robot, table))
     if own > sheet:
         raise InputError(
             "the controller's kinematics are not those of this arm: they are farther from what calibration found than "
@@ -181,7 +181,9 @@ def _poses(programs: Sequence[Program]) -> bool:
 
 def _calibration(programs: Sequence[Program]) -> MakersCalibration | None:
     """Return how controllers of the programs' language may have been calibrated; all are in one language."""
-    return next((one.calibration for one in LANGUAGES if programs and one.name == programs[0].language), None)
+    return next(
+        (language.calibration for language in LANGUAGES if programs and language.name == programs[0].language), None
+    )
 
 
 # How far a correction may take targets: no farther than the errors of the robot explain.
@@ -301,11 +303,11 @@ def check_size(
     largest = CorrectionLimit(float(moved.max(initial=0.0)), float(turned.max(initial=0.0)))
     holds = limit if accepted is None else accepted
     if holds.allows(largest):
-        said = (
+        message = (
             f"Targets are moved and turned by up to {largest.text}, which was accepted. Errors of this robot explain "
             f"{limit.text}: {limit.words}. {check}"
         )
-        return [] if limit.allows(largest) else [CORRECTIONS_LARGE(said)]
+        return [] if limit.allows(largest) else [CORRECTIONS_LARGE(message)]
     worst = int((moved if largest.moved > holds.moved else turned).argmax())
     enough = f"{_up(largest.moved * 1e3)}mm,{_up(math.degrees(largest.turned))}deg"
     raise InputError(
@@ -336,20 +338,20 @@ _BEGINNINGS: Final = (re.compile(r"\w+"), re.compile(r"\w+\[\d+"))
 
 def numbers_read(language: Language, corrections: Sequence[Correction]) -> list[str]:
     """Return where programs read numbers of targets that are corrected: file, line and what is read."""
-    return [where for correction in corrections for where in _read_in(language, correction)]
+    return [place for correction in corrections for place in _read_in(language, correction)]
 
 
 def _read_in(language: Language, correction: Correction) -> Iterator[str]:
     program = correction.program
     corrected = {target.name for row, target in enumerate(program.targets) if correction.corrected[row]}
     names = {
-        found[0].lower() for name in corrected for begins in _BEGINNINGS if (found := begins.match(name)) is not None
+        match[0].lower() for name in corrected for begins in _BEGINNINGS if (match := begins.match(name)) is not None
     }
     for source in program.sources:
-        for found in language.reads.finditer(source.text) if language.reads is not None else ():
-            if found[1] is not None and found[1].lower() in names:
-                line = source.text.count("\n", 0, found.start()) + 1
-                yield f"{source.where(line)}: {' '.join(found[0].split())}"
+        for match in language.reads.finditer(source.text) if language.reads is not None else ():
+            if match[1] is not None and match[1].lower() in names:
+                line = source.text.count("\n", 0, match.start()) + 1
+                yield f"{source.where(line)}: {' '.join(match[0].split())}"
 
 
 def refuse_corrected_already(

@@ -45,7 +45,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.engine.command.split import MAKER, accept_argument, changed_since, refuse_unaccepted, told_of
+from truearm.engine.command.split import MAKER, accept_argument, changed_since, faults_of, refuse_unaccepted
 from truearm.engine.command.texts import positions_of
 from truearm.engine.diagnose.external_force import check_force
 from truearm.engine.document.document import Block, detail, say, under
@@ -223,7 +223,7 @@ _FAR = 0.02e-3
 
 def follow(asked: FollowPath) -> FollowedPath:
     """Follow a path, correct it, and write what was asked for."""
-    chosen = [BY_NAME[one] for one in (BY_NAME if "all" in asked.languages else asked.languages)]
+    chosen = [BY_NAME[name] for name in (BY_NAME if "all" in asked.languages else asked.languages)]
     inputs = (asked.robot, asked.file, *kinematics_file(asked.controller_kinematics))
     folder = None
     if asked.out is not None:
@@ -239,7 +239,7 @@ def follow(asked: FollowPath) -> FollowedPath:
         refuse_unaccepted(arm, accepted)
     joints_are = joints_argument(asked.joints, arm)
     followed = _followed(asked, arm, joints_are)
-    notices = [*changed_since(asked.robot), *told_of(arm), *check_force([(arm, followed.joints[followed.best])])]
+    notices = [*changed_since(asked.robot), *faults_of(arm), *check_force([(arm, followed.joints[followed.best])])]
     if chosen and followed.calibrated:
         notices += _check_size(followed, correction_limit(calibrated), allowed)
     texts = _texts(asked, arm, followed, chosen, notices)
@@ -247,7 +247,7 @@ def follow(asked: FollowPath) -> FollowedPath:
     if chosen and followed.calibrated:
         ledger, unremembered = ledger_to_write(ledger_of(asked.robot))
         notices += unremembered
-    made = FollowedPath(
+    result = FollowedPath(
         arm,
         followed,
         texts,
@@ -258,8 +258,8 @@ def follow(asked: FollowPath) -> FollowedPath:
         None if ledger is None else (ledger, _entries(arm, chosen, texts)),
     )
     if folder is not None:
-        made.save(folder)
-    return made
+        result.save(folder)
+    return result
 
 
 def _followed(asked: FollowPath, arm: Robot, joints_are: JointsOf) -> CorrectedPath:
@@ -344,9 +344,9 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
             refuse_unanswered([controller_question(arm, as_read)])
             notices += controller_notices(arm, as_read)
         texts |= files
-    foreign = [one for one in languages if arm.maker and not one.runs_on(arm.maker)]
+    foreign = [dialect for dialect in languages if arm.maker and not dialect.runs_on(arm.maker)]
     if foreign:
-        written = ", ".join(f"{one.name} of {one.makers[0]}" for one in foreign)
+        written = ", ".join(f"{dialect.name} of {dialect.makers[0]}" for dialect in foreign)
         notices.append(MAKER(f"{arm.name} is of {arm.maker}, and programs were written in {written}."))
     if content.beside > _FAR:
         notices.append(
@@ -354,7 +354,7 @@ def _programs(arm: Robot, content: NewProgram, languages: Sequence[Language], no
                 f"Between its targets the program leaves the path by up to {millimetres(content.beside)} mm."
             )
         )
-    untimed = [one.name for one in languages if content.untimed(one.name)]
+    untimed = [dialect.name for dialect in languages if content.untimed(dialect.name)]
     if untimed:
         notices.append(
             UNTIMED_MOVES(

@@ -90,15 +90,15 @@ def path_page(followed: FollowedPath) -> str:
 
 def _errors(followed: FollowedPath) -> Figure:
     path = followed.path
-    kept = _thinned(len(path.motion.time))
-    along = rounded_to(path.planned.trajectory.distance[kept] * 1e3, 2)
+    rows = _thinned(len(path.motion.time))
+    along = rounded_to(path.planned.trajectory.distance[rows] * 1e3, 2)
     traces = [
         {
             "type": "scatter",
             "mode": "lines",
             "name": STAGES[name],
             "x": along,
-            "y": rounded(path.errors[name][kept] * 1e3, 5),
+            "y": rounded(path.errors[name][rows] * 1e3, 5),
             "line": {"color": _COLOURS[name], "width": 1.8},
             "hovertemplate": f"{STAGES[name]}: %{{y:.3g}} mm at %{{x:.0f}} mm<extra></extra>",
         }
@@ -110,12 +110,12 @@ def _errors(followed: FollowedPath) -> Figure:
 def _space(followed: FollowedPath) -> Section:
     """Draw the path, and how far beside it the robot goes, enlarged."""
     path = followed.path
-    kept = _thinned(len(path.motion.time))
-    wanted = path.planned.trajectory.position[kept]
+    rows = _thinned(len(path.motion.time))
+    wanted = path.planned.trajectory.position[rows]
     traces = [_curve("path", wanted, "#2b2f33", 4)]
     words = "In the frame of the path."
     if path.calibrated:
-        beside = path.tips["nothing"][kept] - wanted
+        beside = path.tips["nothing"][rows] - wanted
         largest = float(np.linalg.norm(beside, axis=1).max())
         size = float(np.ptp(wanted, axis=0).max())
         times = 10.0 ** np.floor(np.log10(_DRAWN * size / largest)) if largest > 0.0 and size > 0.0 else 1.0
@@ -142,7 +142,7 @@ def _curve(name: str, points: np.ndarray, colour: str, width: int) -> Figure:
 def _moments(followed: FollowedPath) -> Figure:
     path = followed.path
     assert path.loads is not None
-    kept = _thinned(len(path.motion.time))
+    rows = _thinned(len(path.motion.time))
     traces = []
     for number, joint in enumerate(followed.robot.joints):
         turns = joint.kind == "revolute"
@@ -152,8 +152,8 @@ def _moments(followed: FollowedPath) -> Figure:
                 "type": "scatter",
                 "mode": "lines",
                 "name": name,
-                "x": rounded(path.motion.time[kept], 6),
-                "y": rounded(path.loads[number, 5 if turns else 2][kept], 6),
+                "x": rounded(path.motion.time[rows], 6),
+                "y": rounded(path.loads[number, 5 if turns else 2][rows], 6),
                 "line": {"color": _JOINTS[number % len(_JOINTS)], "width": 1.8},
                 "hovertemplate": f"{name}: %{{y:.4g}} {unit} at %{{x:.3f}} s<extra></extra>",
             }

@@ -30,7 +30,7 @@ from truearm.engine.programs.chosen_targets import (
 from truearm.engine.programs.correction import Correction
 from truearm.engine.programs.expected_errors import expected_errors
 from truearm.engine.programs.fake_targets import nominal_robot
-from truearm.engine.programs.gauge import base_is_held, base_shift, best_agreement, flange_is_held
+from truearm.engine.programs.gauge import base_fixed, base_shift, best_agreement, flange_fixed
 from truearm.engine.programs.program import Edit, Language, Move, Program, Split
 from truearm.engine.programs.program_poses import Provenance, numbers_of, provenance
 from truearm.engine.programs.resolved_program import Between, RealTips, ResolvedProgram
@@ -125,11 +125,11 @@ def corrected_programs(
     if len(set(loads.values())) == 1:
         robot = robot.with_payload(next(iter(loads.values())))
     nominal = nominal_robot(robot)
-    kept = kept_by_choice(programs, choice)
-    tools, frames = provenance(programs, cell, "tool", kept), provenance(programs, cell, "frame", kept)
-    if frames == "assumed" and base_is_held(robot) and not (choice.was_taught("frames") or choice.was_taught("points")):
+    unchanged = kept_by_choice(programs, choice)
+    tools, frames = provenance(programs, cell, "tool", unchanged), provenance(programs, cell, "frame", unchanged)
+    if frames == "assumed" and base_fixed(robot) and not (choice.was_taught("frames") or choice.was_taught("points")):
         frames = "held"
-    if tools == "assumed" and flange_is_held(robot) and not choice.was_taught("tools"):
+    if tools == "assumed" and flange_fixed(robot) and not choice.was_taught("tools"):
         tools = "held"
     start, agreed = best_agreement(robot)
     flange = agreed
@@ -140,32 +140,32 @@ def corrected_programs(
     acting = wrenches_of_targets(programs, wrenches)
     resolved = [
         ResolvedProgram(robot, nominal, program, cell, arms, staying, at_targets, flange)
-        for program, staying, at_targets in zip(programs, kept, acting, strict=True)
+        for program, staying, at_targets in zip(programs, unchanged, acting, strict=True)
     ]
-    refuse_beyond("wrenches", sum(one.forces for one in resolved), parameter="wrench")
-    names = tuple(dict.fromkeys(name for one in resolved for name in one.frames))
+    refuse_beyond("wrenches", sum(program.forces for program in resolved), parameter="wrench")
+    names = tuple(dict.fromkeys(name for program in resolved for name in program.frames))
     bases = _bases(resolved, names, frames, choice, start, flange, progress)
     progress("finding fake targets")
-    corrections = [one.correction(bases, flange) for one in resolved]
+    corrections = [program.correction(bases, flange) for program in resolved]
     if robot.proof is not None and arm_is_known(robot):
         progress("judging the targets")
         shared = names if choice.was_taught("frames") else ()
-        reached = [one.reached(made, flange, shared) for one, made in zip(resolved, corrections, strict=True)]
+        reached = [program.reached(moved, flange, shared) for program, moved in zip(resolved, corrections, strict=True)]
         expected = expected_errors(robot, robot.proof, reached, frames, taught_tools=choice.was_taught("tools"))
         corrections = [
-            one.judged(made, of_targets, every=choice.every)
-            for one, made, of_targets in zip(resolved, corrections, expected, strict=True)
+            program.judged(moved, of_targets, every=choice.every)
+            for program, moved, of_targets in zip(resolved, corrections, expected, strict=True)
         ]
     return CorrectedPrograms(
         tuple(corrections),
         Frames(tools, frames, bases, flange),
-        tuple(one.guess for one in resolved if one.guess),
-        tuple(partial(one.between, bases, flange) for one in resolved),
-        tuple(partial(one.real_tips, bases, flange) for one in resolved),
+        tuple(program.guess for program in resolved if program.guess),
+        tuple(partial(program.between, bases, flange) for program in resolved),
+        tuple(partial(program.real_tips, bases, flange) for program in resolved),
         choice,
         loads,
-        {name: apart for one in resolved for name, apart in one.tools_apart(agreed).items()},
-        tuple(case for one, made in zip(resolved, corrections, strict=True) for case in one.pushed(made)),
+        {name: apart for program in resolved for name, apart in program.tools_apart(agreed).items()},
+        tuple(case for program, moved in zip(resolved, corrections, strict=True) for case in program.pushed(moved)),
     )
 
 
@@ -208,10 +208,10 @@ def _bases(
     bases: dict[str, Array] = {}
     for group in [(name,) for name in names] if choice.was_taught("frames") else [names]:
         bases |= dict.fromkeys(group, _base_of(programs, group, start, flange))
-        found = [(program, program.some(_MORE_THAN_ONE, group)) for program in programs]
-        if sum(len(rows) for _, rows in found) == 1:
+        rows_of = [(program, program.some(_MORE_THAN_ONE, group)) for program in programs]
+        if sum(len(rows) for _, rows in rows_of) == 1:
             # The frame takes up all that a correction could do to it.
-            for resolved_program, rows in found:
+            for resolved_program, rows in rows_of:
                 resolved_program.keep(rows, ALONE)
     return bases
 
@@ -298,32 +298,36 @@ def split_program(language: Language, correction: Correction, between: Between, 
                 unsplit.append(move.line)
             else:
                 open_moves.append(_SplitMove(correction, index, before))
-    done: list[_SplitMove] = []
+    finished: list[_SplitMove] = []
     while open_moves:
-        shares = [one.shares for one in open_moves]
-        rows = np.repeat([one.end for one in open_moves], [len(s) for s in shares])
-        wanted = np.concatenate([one.path.at(s) for one, s in zip(open_moves, shares, strict=True)])
-        near = np.concatenate([one.near(s) for one, s in zip(open_moves, shares, strict=True)])
-        fakes, found = between(rows, wanted, near)
+        shares = [split_move.shares for split_move in open_moves]
+        rows = np.repeat([split_move.end for split_move in open_moves], [len(s) for s in shares])
+        wanted = np.concatenate([split_move.path.at(s) for split_move, s in zip(open_moves, shares, strict=True)])
+        near = np.concatenate([split_move.near(s) for split_move, s in zip(open_moves, shares, strict=True)])
+        fakes, solved = between(rows, wanted, near)
         again: list[_SplitMove] = []
         given_up: list[_SplitMove] = []
         at = 0
-        for one, asked in zip(open_moves, shares, strict=True):
+        for trial, asked in zip(open_moves, shares, strict=True):
             part = slice(at, at + len(asked))
             at += len(asked)
-            if not found[part].all():
-                unsplit.append(program.moves[one.index].line)
-            elif one.deviates(fakes[part], tolerance):
-                (again if one.split_further(tolerance) else given_up).append(one)
+            if not solved[part].all():
+                unsplit.append(program.moves[trial.index].line)
+            elif trial.deviates(fakes[part], tolerance):
+                (again if trial.split_further(tolerance) else given_up).append(trial)
             else:
-                done.append(one)
-        unsplit += [program.moves[one.index].line for one in given_up]
+                finished.append(trial)
+        unsplit += [program.moves[split_move.index].line for split_move in given_up]
         open_moves = again
-    several = sorted((one for one in done if one.segments > 1), key=lambda one: one.index)
-    edits, whole = language.split(program, [one.split() for one in several])
+    several = sorted(
+        (split_move for split_move in finished if split_move.segments > 1), key=lambda split_move: split_move.index
+    )
+    edits, whole = language.split(program, [split_move.split() for split_move in several])
     unsplit += [program.moves[index].line for index in whole]
-    split = [one for one in several if one.index not in whole]
-    return ProgramSplit(tuple(edits), len(split), sum(one.segments - 1 for one in split), tuple(sorted(unsplit)))
+    split = [split_move for split_move in several if split_move.index not in whole]
+    return ProgramSplit(
+        tuple(edits), len(split), sum(split_move.segments - 1 for split_move in split), tuple(sorted(unsplit))
+    )
 
 
 class _SplitMove:
@@ -361,9 +365,9 @@ class _SplitMove:
         self._fakes = np.concatenate([self._ends[:1], fakes, self._ends[1:]])
         self._deviation = 0.0
         for segment in range(self.segments):
-            one = self._fakes[4 * segment : 4 * segment + 5]
-            gone = _Path(one[0], one[4], one[2] if self._circular else None).at(_CHECKED)
-            away = float(np.linalg.norm(gone[:, :3, 3] - one[1:4, :3, 3], axis=1).max())
+            frames = self._fakes[4 * segment : 4 * segment + 5]
+            gone = _Path(frames[0], frames[4], frames[2] if self._circular else None).at(_CHECKED)
+            away = float(np.linalg.norm(gone[:, :3, 3] - frames[1:4, :3, 3], axis=1).max())
             self._deviation = max(self._deviation, away)
         return self._deviation > tolerance
 

@@ -67,15 +67,15 @@ def program_html(correction: ProgramCorrection) -> str:
     counts = [Words(f"{file.name}: {file.count_words}.", quiet=True) for file in correction.files]
     if len(counts) > _COUNTED:
         counts = [*counts[:_COUNTED], Words(f"And {len(counts) - _COUNTED} more files.", quiet=True)]
-    notes = [("Serial number" if key == "serial" else key.capitalize(), said) for key, said in correction.notes.items()]
-    told = [notice for notice in correction.warnings if notice.code not in ("frames-assumed", "tools-assumed")]
+    notes = [("Serial number" if key == "serial" else key.capitalize(), note) for key, note in correction.notes.items()]
+    notices = [notice for notice in correction.warnings if notice.code not in ("frames-assumed", "tools-assumed")]
     refers = [Words(sentence) for sentence in correction.frame_words]
     return Document(
         f"Corrected programs for {correction.robot.title}",
         [
             *counts,
             *([Facts(notes)] if notes else []),
-            Section("", [_lead(correction), *warned(told)], "result"),
+            Section("", [_lead(correction), *warned(notices)], "result"),
             *_simulated(correction),
             _files(correction),
             Section("What the correction refers to", refers, "frames"),
@@ -103,12 +103,12 @@ def _lead(correction: ProgramCorrection) -> Lead:
         shifts += [Words(f"{file.shared_words}.") for file in correction.files if file.shared_words]
     if correction.simulated is not None:
         seen = correction.simulated
-        before, now = _spread(seen.original * 1e3), _spread(seen.corrected * 1e3)
+        before, after = _spread(seen.original * 1e3), _spread(seen.corrected * 1e3)
         words = (
             f"Mean distance of {seen.robot} from where the program meant it to be, with the original and with the "
-            f"corrected program; at most {before[1]} and {now[1]} mm."
+            f"corrected program; at most {before[1]} and {after[1]} mm."
         )
-        return Lead([Words(words), *shifts], now[0], before[0], "mm")
+        return Lead([Words(words), *shifts], after[0], before[0], "mm")
     expected = _expected(correction.files)
     if expected is None:
         words = (
@@ -138,8 +138,8 @@ def _simulated(correction: ProgramCorrection) -> list[Section]:
     seen = correction.simulated
     if seen is None:
         return []
-    before, now = seen.original * 1e3, seen.corrected * 1e3
-    drawn = histogram(before, now, "mm", "distance from the programmed path", "targets")
+    before, after = seen.original * 1e3, seen.corrected * 1e3
+    drawn = histogram(before, after, "mm", "distance from the programmed path", "targets")
     return [Section("Before and after", [Picture("simulated", drawn)])]
 
 
@@ -161,7 +161,7 @@ def _files(correction: ProgramCorrection) -> Section:
     heading = ("targets", "corrected", "kept", "unchanged", "expected [mm]", "now", "shift [mm]", "largest")
     blocks: list[Block] = [Words(words), Table(("file", *heading), rows, look="spread", wide=True)]
     if correction.splits:
-        moves, added = (sum(getattr(split, what) for split in correction.splits) for what in ("moves", "added"))
+        moves, added = (sum(getattr(split, name) for split in correction.splits) for name in ("moves", "added"))
         blocks.append(Words(f"{moves} straight or circular moves were split by {added} more targets."))
     return Section("Files", blocks, "files")
 
@@ -197,7 +197,7 @@ def _not_better(files: Sequence[FileCorrection]) -> list[Section]:
 
 
 def _skipped(files: Sequence[FileCorrection]) -> list[Section]:
-    rows = [(Cell(file.name, code=True), str(one.line), one.reason) for file in files for one in file.skipped]
+    rows = [(Cell(file.name, code=True), str(target.line), target.reason) for file in files for target in file.skipped]
     return _listed("Left as they are", "skipped", ("file", "line", "reason"), rows, texts=(2,))
 
 
@@ -342,7 +342,7 @@ def along_figure(corrections: Sequence[Correction]) -> Figure:
         targets = correction.program.targets
         names = [f"{html.escape(targets[row].name or 'inline')}, line {targets[row].line}" for row in rows.tolist()]
         program = html.escape(correction.program.sources[0].path.stem)
-        for what, values, unit, colour, axes in (
+        for name, values, unit, colour, axes in (
             ("moved", correction.moved[rows] * 1e3, "mm", AFTER, "y"),
             ("turned", np.degrees(correction.turned[rows]), "deg", BEFORE, "y2"),
         ):
@@ -350,8 +350,8 @@ def along_figure(corrections: Sequence[Correction]) -> Figure:
                 {
                     "type": "scatter",
                     "mode": "lines+markers" if len(rows) < 200 else "lines",
-                    "name": f"{what} [{unit}]",
-                    "legendgroup": what,
+                    "name": f"{name} [{unit}]",
+                    "legendgroup": name,
                     "showlegend": number == 0,
                     "x": (steps + start).tolist(),
                     "y": rounded(values, 4),
@@ -359,7 +359,7 @@ def along_figure(corrections: Sequence[Correction]) -> Figure:
                     "text": names,
                     "line": {"color": colour, "width": 1.5},
                     "marker": {"size": 5},
-                    "hovertemplate": f"{program}, %{{text}}: {what} by %{{y}} {unit}<extra></extra>",
+                    "hovertemplate": f"{program}, %{{text}}: {name} by %{{y}} {unit}<extra></extra>",
                 }
             )
         start += len(order)
@@ -386,21 +386,21 @@ def expected_figure(corrections: Sequence[Correction]) -> Figure:
         rows = order[steps]
         targets = correction.program.targets
         names = [f"{html.escape(targets[row].name or 'inline')}, line {targets[row].line}" for row in rows.tolist()]
-        now = np.where(correction.corrected, known.after, known.before)
-        for what, values, colour in (("before", known.before, BEFORE), ("now", now, AFTER)):
+        after = np.where(correction.corrected, known.after, known.before)
+        for name, values, colour in (("before", known.before, BEFORE), ("now", after, AFTER)):
             traces.append(
                 {
                     "type": "scatter",
                     "mode": "lines+markers" if len(rows) < 200 else "lines",
-                    "name": what,
-                    "legendgroup": what,
+                    "name": name,
+                    "legendgroup": name,
                     "showlegend": number == 0,
                     "x": (steps + start).tolist(),
                     "y": rounded(values[rows] * 1e3, 4),
                     "text": names,
                     "line": {"color": colour, "width": 1.5},
                     "marker": {"size": 5},
-                    "hovertemplate": f"%{{text}}: %{{y}} mm expected {what}<extra></extra>",
+                    "hovertemplate": f"%{{text}}: %{{y}} mm expected {name}<extra></extra>",
                 }
             )
         start += len(order)
@@ -417,25 +417,25 @@ def _expected(files: Sequence[FileCorrection]) -> tuple[str, str, str, str] | No
     known = [file.expected for file in files if file.expected is not None]
     if not known:
         return None
-    before, now = (np.concatenate(values) * 1e3 for values in zip(*known, strict=True))
-    return (*_spread(before), *_spread(now))
+    before, after = (np.concatenate(values) * 1e3 for values in zip(*known, strict=True))
+    return (*_spread(before), *_spread(after))
 
 
 def _not_better_row(file: FileCorrection, row: int) -> tuple[str | Cell, ...]:
     """Return the row of a table: file, line, expected distances [mm] before and after, probability, what became."""
     known = file.correction.expected
     before, after, worse = (known.before[row], known.after[row], known.worse[row]) if known else (np.nan,) * 3
-    said = "corrected" if file.correction.corrected[row] else "kept"
+    state = "corrected" if file.correction.corrected[row] else "kept"
     line = file.correction.program.targets[row].line
     share = f"{worse:.0%}".replace("%", " %")
-    return Cell(file.name, code=True), str(line), f"{before * 1e3:.3f}", f"{after * 1e3:.3f}", share, said
+    return Cell(file.name, code=True), str(line), f"{before * 1e3:.3f}", f"{after * 1e3:.3f}", share, state
 
 
 def _order(correction: Correction) -> NDArray[np.intp]:
     """Return the targets in the order of the moves, vias too; in the order of the text where nothing moves to them."""
     moves = [row for move in correction.program.moves for row in (move.via, move.target) if row is not None]
-    rest = sorted(set(range(len(correction.program.targets))) - set(moves))
-    return np.array([*moves, *rest], dtype=int)
+    others = sorted(set(range(len(correction.program.targets))) - set(moves))
+    return np.array([*moves, *others], dtype=int)
 
 
 def _line(view: _View, points: Array, name: str, colour: str, width: float) -> Figure:

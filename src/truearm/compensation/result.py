@@ -115,27 +115,27 @@ class FileCorrection(Record):
         if known is None:
             return None
         corrected = self.correction.corrected
-        mine = np.array([target.source == self.source for target in self.correction.program.targets], dtype=bool)
-        before, now = (known.drawn.interval(done, mine) for done in (np.zeros_like(corrected), corrected))
-        return None if before is None or now is None else (before, now)
+        own = np.array([target.source == self.source for target in self.correction.program.targets], dtype=bool)
+        before, after = (known.drawn.interval(applied, own) for applied in (np.zeros_like(corrected), corrected))
+        return None if before is None or after is None else (before, after)
 
     @cached_property
     def not_better(self) -> tuple[int, ...]:
         """Indices of the targets whose correction would rather do harm."""
-        found = set(self.correction.not_better)
-        return tuple(row for row in self.rows if row in found)
+        rows = set(self.correction.not_better)
+        return tuple(row for row in self.rows if row in rows)
 
     @cached_property
     def skipped(self) -> tuple[Skipped, ...]:
         """What stays as it is, and why."""
-        return tuple(one for one in self.correction.skipped if one.source == self.source)
+        return tuple(target for target in self.correction.skipped if target.source == self.source)
 
     def blocks(self) -> Iterator[Block]:
         """Give the error to expect, what became of the targets, and what was skipped, in mm."""
-        yield from self.told()
+        yield from self.corrected_blocks()
         yield detail(*self.left_unchanged)
 
-    def told(self, *, shared: bool = False) -> Iterator[Block]:
+    def corrected_blocks(self, *, shared: bool = False) -> Iterator[Block]:
         """Give it without the lines of what was skipped, with what its targets share if that is wanted, in mm."""
         moved = (
             f"; moved by {self.mean_shift * 1e3:.3f} mm on average, {self.largest_shift * 1e3:.3f} mm at most"
@@ -150,7 +150,7 @@ class FileCorrection(Record):
             targets=self.targets,
             corrected=self.corrected,
             kept={why.replace("`", ""): number for why, number in self.kept.items()},
-            skipped=[{"line": one.line, "reason": one.reason} for one in self.skipped],
+            skipped=[{"line": target.line, "reason": target.reason} for target in self.skipped],
             expected_mm=self._expected(),
             not_better=self._not_better(),
         )
@@ -167,7 +167,7 @@ class FileCorrection(Record):
     @property
     def left_unchanged(self) -> list[str]:
         """What was skipped, line by line of the program, and why."""
-        return [f"  {self.name}, line {one.line}: {one.reason}" for one in self.skipped]
+        return [f"  {self.name}, line {target.line}: {target.reason}" for target in self.skipped]
 
     def _expected(self) -> dict[str, dict[str, Any]] | None:
         """Return the errors to expect as JSON holds them [mm]."""
@@ -283,7 +283,7 @@ class ProgramCorrection(Record):
         if self.simulated is not None:
             yield from self.simulated.blocks()
         shared = self.result.frames.frames != "assumed"
-        yield each("programs", (file.told(shared=shared) for file in self.files))
+        yield each("programs", (file.corrected_blocks(shared=shared) for file in self.files))
         known = any(file.expected is not None for file in self.files)
         words = f"  {self.relative}" if known and self.relative else ""
         yield say(words, expected_is_relative=bool(self.relative))
@@ -311,12 +311,14 @@ class ProgramCorrection(Record):
         if not self.result.relative:
             return ""
         each = "in each frame" if self.result.choice.was_taught("frames") else "of all programs together"
-        said = (
+        sentence = (
             f"These errors are of the targets relative to each other, {each}: where a frame is as a whole is not known."
         )
         if any(file.skipped for file in self.files):
-            said += " What is left unchanged is not in them: it now lies off the others by as much as those were moved."
-        return said
+            sentence += (
+                " What is left unchanged is not in them: it now lies off the others by as much as those were moved."
+            )
+        return sentence
 
     @property
     def frame_words(self) -> list[str]:
@@ -326,7 +328,7 @@ class ProgramCorrection(Record):
     def applied(self) -> dict[str, Any]:
         """Return what the records beside the programs say was applied, in mm and deg."""
         frames, choice = self.result.frames, self.result.choice
-        made: dict[str, Any] = {
+        content: dict[str, Any] = {
             "robot": self.robot.name,
             **({"simulated": True} if self.robot.simulated else {}),
             **({"notes": self.notes} if self.notes else {}),
@@ -340,17 +342,17 @@ class ProgramCorrection(Record):
             "frames": frames.frames,
         }
         if choice.taught is not None:
-            made["taught"] = sorted(choice.taught)
+            content["taught"] = sorted(choice.taught)
         if frames.tools == "assumed":
-            made["flange_shift"] = _shift_summary(frames.flange)
+            content["flange_shift"] = _shift_summary(frames.flange)
         if frames.frames == "assumed":
             each = choice.was_taught("frames")
-            made["base_shift"] = (
+            content["base_shift"] = (
                 {name: _shift_summary(shift) for name, shift in frames.bases.items()}
                 if each
                 else _shift_summary(frames.base)
             )
-        return made
+        return content
 
     def _masses(self) -> float | dict[str, float]:
         """Return what the robot carries [kg], by the tool where the programs say it."""

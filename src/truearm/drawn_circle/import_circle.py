@@ -32,12 +32,14 @@ class _Dots(Given):
         """Return the numbers of a text, a single one as it is."""
         from truearm.engine.command.texts import read_numbers
 
-        found = read_numbers(typed, name, "a number, or X,Y")
-        return found[0] if len(found) == 1 else found
+        numbers = read_numbers(typed, name, "a number, or X,Y")
+        return numbers[0] if len(numbers) == 1 else numbers
 
     def typed_again(self, value: Any) -> list[str]:
         """Return them with commas between."""
-        return [",".join(Number().typed_again(one)[0] for one in (value if isinstance(value, tuple) else (value,)))]
+        return [
+            ",".join(Number().typed_again(number)[0] for number in (value if isinstance(value, tuple) else (value,)))
+        ]
 
 
 class ImportCircle(Declared, IntoFile):

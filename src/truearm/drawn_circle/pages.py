@@ -20,7 +20,7 @@ from truearm.engine.command.arguments import file_for
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text, refuse_other_separators
 from truearm.engine.data.readers.cells import Cells, Layout, read_cells
-from truearm.engine.data.readers.rows import Configurations, found_configurations, in_order
+from truearm.engine.data.readers.rows import Configurations, in_order, row_configurations
 from truearm.engine.document.records import ImportedCircles
 from truearm.engine.robot.urdf_writing import joint_names
 
@@ -63,9 +63,9 @@ def read_drawn_circles(
     """
     drawn = {name: _page(page, dpi) for name, page in pages.items()}
     _refuse_twice(pages, drawn)
-    labels = tuple(label for found, _ in drawn.values() for label in found.labels)
-    joints = np.concatenate([found.joints for found, _ in drawn.values()])
-    each = [len(found.labels) for found, _ in drawn.values()]
+    labels = tuple(label for configurations, _ in drawn.values() for label in configurations.labels)
+    joints = np.concatenate([configurations.joints for configurations, _ in drawn.values()])
+    each = [len(configurations.labels) for configurations, _ in drawn.values()]
     distance = np.concatenate([circle.distance for _, circle in drawn.values()])
     height = np.concatenate([circle.height for _, circle in drawn.values()])
     page, none = np.repeat(np.arange(len(pages)), each), np.full(len(labels), np.nan)
@@ -73,7 +73,7 @@ def read_drawn_circles(
     centres, papers = (tuple(f"{kind}_{name}" for name in pages) for kind in ("centre", "paper"))
     kinds, joints_are = next(iter(drawn.values()))[0].kinds, next(iter(drawn.values()))[0].joints_are
     data = Dataset(
-        source=" and ".join(str(one.points) for one in pages.values()),
+        source=" and ".join(str(page_of_circle.points) for page_of_circle in pages.values()),
         labels=labels,
         joints=joints,
         joint_kinds=kinds,
@@ -114,7 +114,7 @@ def _page(page: Page, dpi: float | tuple[float, float] | None) -> tuple[Configur
     joints_are, names = joint_names(columns, f"{page.points}, line {cells.header}")
     joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"][0])
-    configurations = found_configurations(
+    configurations = row_configurations(
         cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are
     )
     if len(configurations.labels) < len(labels):
@@ -133,13 +133,13 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
     """Return place and unit of each column, or refuse the header."""
     columns: dict[str, tuple[int, str]] = {}
     for place, heading in enumerate(cells.names):
-        where = f"{cells.source}, line {cells.header}, column {place + 1}"
+        location = f"{cells.source}, line {cells.header}, column {place + 1}"
         match = _HEADING.fullmatch(heading)
         if match is None or match[1] in columns:
-            what = "the column is not known" if match is None else f"the column {match[1]} appears twice"
-            raise InputError(what, where=where, came=heading, allowed=_ALLOWED)
+            message = "the column is not known" if match is None else f"the column {match[1]} appears twice"
+            raise InputError(message, where=location, came=heading, allowed=_ALLOWED)
         units = {"angle": ANGLE_UNITS, "height": LENGTH_UNITS}.get(match[1], (*ANGLE_UNITS, *LENGTH_UNITS))
-        unit = "1" if match[1] == "configuration" else checked_unit(match[2], units, f"{where}, {heading}")
+        unit = "1" if match[1] == "configuration" else checked_unit(match[2], units, f"{location}, {heading}")
         columns[match[1]] = place, unit
     for name in ("configuration", "angle", "height"):
         if name not in columns:
@@ -151,8 +151,8 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
 
 def _refuse_twice(pages: Mapping[str, Page], drawn: Mapping[str, tuple[Configurations, DrawnCircle]]) -> None:
     first: dict[str, str] = {}
-    count = {len(found.kinds) for found, _ in drawn.values()}
-    if len({found.joints_are for found, _ in drawn.values()}) > 1:
+    count = {len(part.kinds) for part, _ in drawn.values()}
+    if len({part.joints_are for part, _ in drawn.values()}) > 1:
         raise InputError(
             "the pages have joint positions of two kinds",
             where=" and ".join(str(page.points) for page in pages.values()),
@@ -165,8 +165,8 @@ def _refuse_twice(pages: Mapping[str, Page], drawn: Mapping[str, tuple[Configura
             where=" and ".join(str(page.points) for page in pages.values()),
             came=f"{' and '.join(map(str, sorted(count)))} joints",
         )
-    for name, (found, _) in drawn.items():
-        for label in found.labels:
+    for name, (configurations, _) in drawn.items():
+        for label in configurations.labels:
             if label in first:
                 raise InputError(
                     "a configuration is on two pages",

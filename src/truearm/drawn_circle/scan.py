@@ -58,24 +58,26 @@ def read_page(path: Path, dpi: float | tuple[float, float] | None = None) -> Pag
             its resolution or that is none of a scanner's (100 to 4800).
     """
     image, declared = _opened(path)
-    given = declared if dpi is None else (dpi if isinstance(dpi, tuple) else (dpi, dpi))
-    if given is None:
+    resolution = declared if dpi is None else (dpi if isinstance(dpi, tuple) else (dpi, dpi))
+    if resolution is None:
         raise InputError(
             "the file does not say its resolution",
             where=str(path),
             cure="Give the dots per inch of the scan, `dpi`, or scan again and keep the file as the scanner wrote it.",
         )
-    if not all(math.isfinite(value) and _RESOLUTIONS[0] <= value <= _RESOLUTIONS[1] for value in given):
+    if not all(math.isfinite(value) and _RESOLUTIONS[0] <= value <= _RESOLUTIONS[1] for value in resolution):
         raise InputError(
             "this is no resolution of a scan",
             parameter=None if dpi is None else "dpi",
             where=str(path) if dpi is None else None,
-            came=" x ".join(f"{value:g} dpi" for value in given),
+            came=" x ".join(f"{value:g} dpi" for value in resolution),
             allowed=f"{_RESOLUTIONS[0]:g} to {_RESOLUTIONS[1]:g} dots per inch",
             cure="Give the dots per inch of the scan, `dpi`." if dpi is None else "Scan at 300 dpi.",
         )
     inch = to_si(1.0, "in")
-    page = Page(source=str(path), brightness=_brightness(image, path), pitch=(inch / given[0], inch / given[1]))
+    page = Page(
+        source=str(path), brightness=_brightness(image, path), pitch=(inch / resolution[0], inch / resolution[1])
+    )
     if min(page.size) < _SHORTEST_EDGE:
         raise InputError(
             "the page is too small",
@@ -184,14 +186,14 @@ class Ink:
 
     def everywhere(self) -> Array:
         """Return the darkness of all dots, ``(rows, columns)``."""
-        made = np.empty(self.brightness.shape)
+        darkness = np.empty(self.brightness.shape)
         for first in range(
-            0, len(made), _ROWS_AT_ONCE
+            0, len(darkness), _ROWS_AT_ONCE
         ):  # the places of all dots would take much more memory than these
             part = self.brightness[first : first + _ROWS_AT_ONCE]
             rows, columns = (np.asarray(places, dtype=np.float64) for places in np.indices(part.shape))
-            made[first : first + _ROWS_AT_ONCE] = 1 - part / self._paper_at(rows + first, columns)
-        return made
+            darkness[first : first + _ROWS_AT_ONCE] = 1 - part / self._paper_at(rows + first, columns)
+        return darkness
 
     def _paper_at(self, rows: Array, columns: Array) -> Array:
         from scipy.ndimage import map_coordinates
@@ -408,13 +410,13 @@ def _middle(radii: Array, rays: Array, threshold: float) -> tuple[Array, float]:
     right = np.where(light & (place > at[:, None]), place, len(radii)).min(axis=1)
     run = (place > left[:, None]) & (place < right[:, None])
     weights = np.where(run, np.minimum(rays, _LEVELS[1] * usual) - _LEVELS[0] * usual, 0.0)
-    found = (darkest > np.maximum(threshold, _LEVELS[0] * usual[:, 0])) & (left >= 0) & (right < len(radii))
-    if found.sum() < _LEAST_SECTORS * sectors:
+    is_line = (darkest > np.maximum(threshold, _LEVELS[0] * usual[:, 0])) & (left >= 0) & (right < len(radii))
+    if is_line.sum() < _LEAST_SECTORS * sectors:
         return nothing
-    profile = np.where(found, weights @ radii / np.where(found, weights.sum(axis=1), 1.0), np.nan)
+    profile = np.where(is_line, weights @ radii / np.where(is_line, weights.sum(axis=1), 1.0), np.nan)
     step = radii[1] - radii[0]
     widths = (right - left - 1) * step
-    width = float(np.median(widths[found]))
+    width = float(np.median(widths[is_line]))
     profile[widths > 2 * width + 4 * step] = np.nan
     off = np.abs(profile - _smooth(profile, _NEIGHBOURHOODS[1]))
     spread = 1.4826 * float(np.nanmedian(off))
@@ -499,16 +501,16 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
         raise InputError(
             "the page is dark", where=str(path), cure="Draw on white paper, and scan without turning it to a negative."
         )
-    found, threshold = _found(coarse, str(path))
-    if len(found) > 1:
+    circles, threshold = _circles_on(coarse, str(path))
+    if len(circles) > 1:
         raise InputError(
             "several circles are drawn on the page",
             where=str(path),
-            came=", ".join(_words(line) for line in found[:2]),
+            came=", ".join(_words(line) for line in circles[:2]),
             allowed="one",
             cure="Scan a page with one of them, or paint the others over with white.",
         )
-    (line,) = found
+    (line,) = circles
     if line.beside > _LARGEST_DOUBLE_SHARE:
         raise InputError(
             "another line, or writing, runs along the circle, or its line is not clear",
@@ -516,12 +518,12 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
             came=f"{_words(line)}, with something beside it over {line.beside:.0%} of the turn",
             cure="Draw one circle, once, on clean paper.",
         )
-    room = min(*line.centre, *(np.array(page.size) - line.centre))
-    if room < line.radius + _MARGIN:
+    margin = min(*line.centre, *(np.array(page.size) - line.centre))
+    if margin < line.radius + _MARGIN:
         raise InputError(
             "the circle is cut by the edge of the page",
             where=str(path),
-            came=f"{_words(line)}, and the page ends {1e3 * room:.1f} mm from its centre",
+            came=f"{_words(line)}, and the page ends {1e3 * margin:.1f} mm from its centre",
             cure="Lay the whole circle onto the scanner, or draw a smaller one.",
         )
     start = Candidate(
@@ -542,33 +544,33 @@ def read_circle(path: Path, dpi: float | tuple[float, float] | None = None, sect
     )
 
 
-def _found(coarse: Ink, where: str) -> tuple[list[Line], float]:
+def _circles_on(coarse: Ink, place: str) -> tuple[list[Line], float]:
     """Return the different circles on a page and the darkness above which they are inked, or refuse."""
     darkness = coarse.everywhere()
     drawn = False
     for threshold in thresholds(darkness):
         thinned = lines(darkness, coarse.pitch, threshold)
         drawn = drawn or bool(thinned.any())
-        found: list[Line] = []
+        circles: list[Line] = []
         for candidate in candidates(thinned, coarse):
             line = follow(coarse, candidate, 360, threshold)
-            if line is not None and all(_distance(line, other) > _SAME_CIRCLE for other in found):
-                found.append(line)
-        if found:
-            return found, threshold
+            if line is not None and all(_distance(line, other) > _SAME_CIRCLE for other in circles):
+                circles.append(line)
+        if circles:
+            return circles, threshold
     if not drawn:
         raise InputError(
             "nothing is drawn on the page but specks or letters",
-            where=where,
+            where=place,
             cure="Check that the drawn side was scanned, and use a soft pencil or a pen.",
         )
-    raise _no_circle(where)
+    raise _no_circle(place)
 
 
-def _no_circle(where: str) -> InputError:
+def _no_circle(place: str) -> InputError:
     return InputError(
         "there is no circle on the page",
-        where=where,
+        where=place,
         allowed="a line over at least half a turn, round to 4 % of its radius, of 5 mm radius or more",
         cure="Check that the whole circle is on the page and its line is darker than grid and writing.",
     )

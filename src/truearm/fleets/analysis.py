@@ -93,15 +93,15 @@ def differences(kind: Kind) -> tuple[Difference, ...]:
 
     rows = kind.latest
     series = len(rows) >= LEAST_COMPARED
-    found = np.sum(~np.isnan(kind.undrawn[0][rows]), axis=0)
-    enough = found >= (LEAST_COMPARED if series else 1)
+    counts = np.sum(~np.isnan(kind.undrawn[0][rows]), axis=0)
+    enough = counts >= (LEAST_COMPARED if series else 1)
     chosen = np.flatnonzero((kind.determined | kind.shared) & enough)
     if not len(chosen):
         return ()
     undrawn, variance = (part[np.ix_(rows, chosen)] for part in kind.undrawn)
     beside: Beside = "series" if series else "prior"
     if series:
-        freedom = FREEDOM * (found[chosen] - 1)
+        freedom = FREEDOM * (counts[chosen] - 1)
         centre, spread = robust_spread(undrawn)
         more = np.maximum(variance - np.nanmedian(variance, axis=0), 0.0)
         expected = np.sqrt(np.where(spread > 0.0, spread**2 + more, variance))
@@ -119,7 +119,7 @@ def differences(kind: Kind) -> tuple[Difference, ...]:
     compared = int(np.sum(~np.isnan(times)))
     chance = np.minimum(2.0 * stdtr(freedom, -np.abs(times)) * compared, 1.0)
     named = np.argwhere(chance < FALSE_ALARMS)  # False for NaN
-    told = [
+    differing = [
         Difference(
             robot=kind.names[int(rows[row])],
             parameter=kind.parameters[int(chosen[column])],
@@ -133,7 +133,7 @@ def differences(kind: Kind) -> tuple[Difference, ...]:
         )
         for row, column in named.tolist()
     ]
-    return tuple(sorted(told, key=lambda one: -abs(one.times)))
+    return tuple(sorted(differing, key=lambda difference: -abs(difference.times)))
 
 
 #: Why a robot is looked at, the gravest first: it was not calibrated; its result must not be used as it is; its fit did
@@ -220,22 +220,22 @@ def first_looks(
     def add(robot: str, reason: Reason) -> None:
         reasons.setdefault(robot, []).append(reason)
 
-    means = np.array([float("nan") if one.errors else one.mean for one in judged])
+    means = np.array([float("nan") if row.errors else row.mean for row in judged])
     limit = _limit(means)
     median = float(np.nanmedian(means)) if np.isfinite(means).any() else 0.0
-    last = {one.machine: one.name for one in judged}
-    for one in judged:
-        if one.message:
-            add(one.name, Reason("failed", message=one.message))
+    last = {row.machine: row.name for row in judged}
+    for result in judged:
+        if result.message:
+            add(result.name, Reason("failed", message=result.message))
             continue
-        if one.errors:
-            add(one.name, Reason("error", codes=one.errors))
-        if one.fit_status not in _SOUND:
-            add(one.name, Reason("unsound", codes=(one.fit_status or "",)))
-        if one.mean > one.before * (1.0 + 1e-9):  # False for NaN
-            add(one.name, Reason("not better", error=one.mean, beside=one.before))
-        if one.mean > limit and not one.errors:
-            add(one.name, Reason("inaccurate", error=one.mean, beside=median))
+        if result.errors:
+            add(result.name, Reason("error", codes=result.errors))
+        if result.fit_status not in _SOUND:
+            add(result.name, Reason("unsound", codes=(result.fit_status or "",)))
+        if result.mean > result.before * (1.0 + 1e-9):  # False for NaN
+            add(result.name, Reason("not better", error=result.mean, beside=result.before))
+        if result.mean > limit and not result.errors:
+            add(result.name, Reason("inaccurate", error=result.mean, beside=median))
     differing: dict[str, list[Difference]] = {}
     for difference in differences:
         differing.setdefault(difference.robot, []).append(difference)
@@ -325,17 +325,18 @@ def spreads(kind: Kind, differing: Collection[str] = ()) -> tuple[ParameterSprea
     left_out = set(differing)
     rows = [row for row in kind.latest.tolist() if kind.names[row] not in left_out]
     undrawn, variance = (part[rows] for part in kind.undrawn)
-    told = int(np.sum(kind.determined))
+    compared = int(np.sum(kind.determined))
     return tuple(
-        _spread(kind, number, undrawn[:, number], variance[:, number], told) for number in range(len(kind.parameters))
+        _spread(kind, number, undrawn[:, number], variance[:, number], compared)
+        for number in range(len(kind.parameters))
     )
 
 
 def _spread(kind: Kind, number: int, values: Array, variances: Array, compared: int) -> ParameterSpread:
     from scipy.special import chdtri, stdtrit
 
-    there = ~np.isnan(values)
-    n = int(np.sum(there))
+    known = ~np.isnan(values)
+    n = int(np.sum(known))
     prior = float(kind.prior[number])
     verdict: Verdict = "too few"
     if np.isnan(prior):
@@ -353,7 +354,7 @@ def _spread(kind: Kind, number: int, values: Array, variances: Array, compared: 
     )
     if verdict != "too few" or n < LEAST_SPREAD:
         return untold
-    values, estimated = values[there], float(np.mean(variances[there]))
+    values, estimated = values[known], float(np.mean(variances[known]))
     mean, scatter = float(np.mean(values)), float(np.var(values, ddof=1))
     tail = (1.0 - SURE) / 2.0
     freedom = _freedom(values)
@@ -410,7 +411,7 @@ class Errors:
 
 
 @dataclass(frozen=True, eq=False)
-class KindFound:
+class KindAnalysis:
     """What robots of one kind say of their parameters."""
 
     kind: Kind
@@ -430,7 +431,7 @@ class Analysis:
     left_out: tuple[str, ...]
     #: By what they are of, see :data:`ACCURACIES`; those that were not judged are left out.
     errors: Mapping[str, Errors]
-    kinds: tuple[KindFound, ...]  #: Robots of one kind each, the kind with most first.
+    kinds: tuple[KindAnalysis, ...]  #: Robots of one kind each, the kind with most first.
     looks: tuple[Look, ...]  #: Which to look at first.
 
     @property
@@ -446,7 +447,7 @@ class Analysis:
     @property
     def drifts(self) -> tuple[Drift, ...]:
         """All changes of all kinds."""
-        return tuple(one for found in self.kinds for one in found.drifts.found)
+        return tuple(drift for kind in self.kinds for drift in kind.drifts.changes)
 
 
 def analysed(rows: Iterable[Row]) -> Analysis:
@@ -470,33 +471,35 @@ def analysed(rows: Iterable[Row]) -> Analysis:
         when = -np.inf if np.isnan(day) else day
         if known and (row.machine not in last or when >= last[row.machine][0]):
             last[row.machine] = (when, row.name, known)
-    found = []
+    by_kind = []
     for kind in sorted((g.kind for g in kinds.values() if g.names), key=lambda kind: -len(kind.names)):
         differing = differences(kind)
-        found.append(KindFound(kind, differing, spreads(kind, {one.robot for one in differing}), drifts(kind)))
+        by_kind.append(
+            KindAnalysis(kind, differing, spreads(kind, {difference.robot for difference in differing}), drifts(kind))
+        )
     return Analysis(
         measurements=count,
         machines=len(machines),
-        failed=tuple((one.name, one.message) for one in judged if one.message),
-        left_out=tuple(one.name for one in judged if one.errors),
+        failed=tuple((robot.name, robot.message) for robot in judged if robot.message),
+        left_out=tuple(robot.name for robot in judged if robot.errors),
         errors=_errors([(name, known) for _, name, known in last.values()]),
-        kinds=tuple(found),
+        kinds=tuple(by_kind),
         looks=first_looks(
             judged,
-            [difference for each in found for difference in each.differences],
-            [one for each in found for one in each.drifts.significant],
+            [difference for each in by_kind for difference in each.differences],
+            [drift for each in by_kind for drift in each.drifts.significant],
         ),
     )
 
 
 def _errors(known: list[tuple[str, dict[str, Accuracy]]]) -> dict[str, Errors]:
-    made = {}
+    errors = {}
     for kind in ACCURACIES:
-        those = [(name, one[kind]) for name, one in known if kind in one]
+        those = [(name, accuracies[kind]) for name, accuracies in known if kind in accuracies]
         if those:
-            mean, largest = np.array([(one.mean, one.max) for _, one in those]).T
-            made[kind] = Errors(mean, largest, tuple(name for name, _ in those))
-    return made
+            mean, largest = np.array([(accuracy.mean, accuracy.max) for _, accuracy in those]).T
+            errors[kind] = Errors(mean, largest, tuple(name for name, _ in those))
+    return errors
 
 
 def with_proposed(robot: Robot, spreads: Sequence[ParameterSpread]) -> tuple[Robot, tuple[str, ...]]:

@@ -181,7 +181,7 @@ class Gathered:
         self._drawn: list[bool] = []
         self._units: dict[str, str] = {}
         self._waiting: dict[tuple[str, ...], list[tuple[int, FoundParameters]]] = {}
-        self._found: list[tuple[list[int], list[int], Array]] = []
+        self._blocks: list[tuple[list[int], list[int], Array]] = []
         self._covariances: list[tuple[float, ...]] = []
 
     def add(self, row: Row) -> None:
@@ -205,10 +205,11 @@ class Gathered:
             self._units.setdefault(name, unit)
         known = {name: number for number, name in enumerate(self._units)}
         columns = [
-            [getattr(found, kind) for _, found in waiting] for kind in ("value", "nominal", "deviation", "prior")
+            [getattr(parameters, kind) for _, parameters in waiting]
+            for kind in ("value", "nominal", "deviation", "prior")
         ]
         figures = np.stack([np.array(column) for column in columns], axis=2)
-        self._found.append(([number for number, _ in waiting], [known[name] for name in names], figures))
+        self._blocks.append(([number for number, _ in waiting], [known[name] for name in names], figures))
 
     @property
     def kind(self) -> Kind:
@@ -217,8 +218,8 @@ class Gathered:
             self._take(names)
         figures = np.full((len(self.names), len(self._units), 4), np.nan)
         places: list[list[int]] = [[]] * len(self.names)
-        for rows, columns, found in self._found:
-            figures[np.ix_(rows, columns)] = found
+        for rows, columns, block in self._blocks:
+            figures[np.ix_(rows, columns)] = block
             for number in rows:
                 places[number] = columns
         value, nominals, deviation, priors = np.moveaxis(figures, 2, 0)
@@ -277,7 +278,7 @@ _AS_ANOTHER: Final = 0.7
 _LEAST_PARAMETERS: Final = 8
 _Z: Final = 1.959963984540054
 #: A line is called no line where chance alone bends one as far so rarely.
-_BENT: Final = 0.01
+_CURVED: Final = 0.01
 
 
 # Machines that were measured again: which parameters have changed, how fast, and how sure that is.
@@ -342,7 +343,7 @@ class Drifts:
 
     #: Their parameters, the surest change first; of many machines those that changed by more than chance, and the
     #: surest of each.
-    found: tuple[Drift, ...] = ()
+    changes: tuple[Drift, ...] = ()
     compared: int = 0  #: How many parameters of machines were looked at.
     #: Parameters that change alike in all machines: what measured them may have changed instead.
     alike: tuple[AllDrift, ...] = ()
@@ -354,7 +355,7 @@ class Drifts:
     @property
     def significant(self) -> tuple[Drift, ...]:
         """What has changed by more than chance."""
-        return tuple(one for one in self.found if one.significant)
+        return tuple(change for change in self.changes if change.significant)
 
 
 def drifts(kind: Kind) -> Drifts:
@@ -389,17 +390,23 @@ def drifts(kind: Kind) -> Drifts:
             for place, times in enumerate(np.abs(of_machine.times).tolist())
             if few or place == 0 or times > _LIKELY
         ]
-    told = _with_chances(lines, compared)
-    told = [one for i, one in enumerate(told) if few or one.significant or one.machine != told[i - 1].machine]
+    changes = _with_chances(lines, compared)
+    changes = [
+        change
+        for i, change in enumerate(changes)
+        if few or change.significant or change.machine != changes[i - 1].machine
+    ]
     units = dict(zip(kind.parameters, kind.units, strict=True))
     nothing = kind.share < UNINFORMED
     return Drifts(
-        tuple(sorted(told, key=lambda one: (one.chance, -abs(one.times)))),
+        tuple(sorted(changes, key=lambda change: (change.chance, -abs(change.times)))),
         compared,
         _alike(slopes, units),
         tuple(undated),
         tuple(others),
-        tuple(name for name, held in zip(kind.parameters, nothing.tolist(), strict=True) if held) if lines else (),
+        tuple(name for name, is_unknown in zip(kind.parameters, nothing.tolist(), strict=True) if is_unknown)
+        if lines
+        else (),
     )
 
 
@@ -423,7 +430,7 @@ class _Lines:
     errors: Array
     changes: Array  #: changes, deviations: since the first campaign [SI], ``(parameters, campaigns)``.
     deviations: Array
-    bent: Array  #: How rarely chance bends a line so far, ``(parameters,)``; NaN of two campaigns.
+    misfit_chance: Array  #: How rarely chance bends a line so far, ``(parameters,)``; NaN of two campaigns.
 
     @property
     def times(self) -> Array:
@@ -445,7 +452,7 @@ class _Lines:
             high=slope + _Z * error,
             times=slope / error,
             chance=1.0,
-            steady=None if len(self.months) == 2 else bool(self.bent[place] > _BENT),
+            steady=None if len(self.months) == 2 else bool(self.misfit_chance[place] > _CURVED),
             campaign_months=tuple(self.months.tolist()),
             changes=tuple(self.changes[place].tolist()),
             deviations=tuple(self.deviations[place].tolist()),
@@ -457,8 +464,8 @@ class _Lines:
 def _lines(kind: Kind, machine_rows: list[int]) -> _Lines:
     """Return a line through the campaigns of a machine for each parameter that all of them determine or share."""
     rows = np.array(machine_rows)
-    there = ~np.isnan(kind.difference[rows]).any(axis=0)
-    numbers = np.flatnonzero((kind.determined | kind.shared) & there)
+    measured = ~np.isnan(kind.difference[rows]).any(axis=0)
+    numbers = np.flatnonzero((kind.determined | kind.shared) & measured)
     months = (kind.days[rows] - kind.days[rows[0]]) / MONTH
     # A sum with others is not made larger: nobody knows by how much.
     pull = np.where(kind.determined[numbers], kind.pull[np.ix_(rows, numbers)].mean(axis=0), 1.0)
@@ -480,24 +487,24 @@ def _lines(kind: Kind, machine_rows: list[int]) -> _Lines:
     own = np.diagonal(variance, axis1=1, axis2=2)
     since = np.maximum(own + own[:, :1] - 2.0 * variance[:, 0], 0.0)
     since[:, 0] = 0.0
-    made = _Lines(
+    fitted = _Lines(
         numbers=numbers,
         months=months,
         slopes=slopes,
         errors=weight**-0.5,
         changes=values - values[:, :1],
         deviations=np.sqrt(since),
-        bent=_chances(misfit, len(rows) - 2),
+        misfit_chance=_chances(misfit, len(rows) - 2),
     )
-    order = np.argsort(-np.abs(made.times), kind="stable")
+    order = np.argsort(-np.abs(fitted.times), kind="stable")
     return _Lines(
         numbers[order],
         months,
-        made.slopes[order],
-        made.errors[order],
-        made.changes[order],
-        made.deviations[order],
-        made.bent[order],
+        fitted.slopes[order],
+        fitted.errors[order],
+        fitted.changes[order],
+        fitted.deviations[order],
+        fitted.misfit_chance[order],
     )
 
 
@@ -521,9 +528,9 @@ def _covariances(kind: Kind, rows: NDArray[np.intp]) -> Array:
         own = np.einsum("rii->ri", stacked)
     else:  # without correlations, at least as large
         both = own[:, None, :] * own[None, :, :]
-    made = 1.0 - own[:, None, :] - own[None, :, :] + both
-    made[np.arange(len(rows)), np.arange(len(rows))] = 1.0 - own
-    return np.asarray(made)
+    covariances = 1.0 - own[:, None, :] - own[None, :, :] + both
+    covariances[np.arange(len(rows)), np.arange(len(rows))] = 1.0 - own
+    return np.asarray(covariances)
 
 
 def _with_chances(lines: list[Drift], compared: int) -> list[Drift]:
@@ -533,18 +540,18 @@ def _with_chances(lines: list[Drift], compared: int) -> list[Drift]:
     times = np.array([line.times for line in lines])
     chances = np.minimum(2.0 * ndtr(-np.abs(times)) * compared, 1.0)
     reach = float(-ndtri(FALSE_ALARMS / (2.0 * max(compared, 1))))
-    made = []
+    changes = []
     for line, chance in zip(lines, chances.tolist(), strict=True):
         half = reach / _Z * (line.high - line.slope)
-        made.append(replace(line, chance=chance, low=line.slope - half, high=line.slope + half))
-    return made
+        changes.append(replace(line, chance=chance, low=line.slope - half, high=line.slope + half))
+    return changes
 
 
 def _alike(slopes: Mapping[str, Sequence[float]], units: Mapping[str, str]) -> tuple[AllDrift, ...]:
     """Return parameters whose mean slope over the machines is more than chance (Student's t, Bonferroni)."""
     from scipy.special import stdtrit
 
-    made = []
+    common = []
     tail = (1.0 - SURE) / 2.0
     for name, those in slopes.items():
         n = len(those)
@@ -553,5 +560,5 @@ def _alike(slopes: Mapping[str, Sequence[float]], units: Mapping[str, str]) -> t
         mean, error = float(np.mean(those)), float(np.std(those, ddof=1) / np.sqrt(n))
         if error > 0.0 and abs(mean) > float(stdtrit(n - 1, 1.0 - tail / len(slopes))) * error:
             half = float(stdtrit(n - 1, 1.0 - tail)) * error
-            made.append(AllDrift(name, units[name], n, mean, mean - half, mean + half))
-    return tuple(made)
+            common.append(AllDrift(name, units[name], n, mean, mean - half, mean + half))
+    return tuple(common)

@@ -35,10 +35,12 @@ _SEPARATORS: Final = re.compile(r"[;,\s]+")
 #: What may be said of a robot, by its name: what :func:`truearm.calibrate` is asked for that makes its result another.
 #: The entry itself says robot, data and notes.
 OPTIONS: Final[Mapping[str, Option]] = {
-    name: one for name, one in Calibrate.options() if one.repeated and not one.is_argument and name != "notes"
+    name: option
+    for name, option in Calibrate.options()
+    if option.repeated and not option.is_argument and name != "notes"
 }
 #: Those that name a file, from the manifest's folder.
-FILES: Final = tuple(name for name, one in OPTIONS.items() if metavar_of(one).endswith("FILE"))
+FILES: Final = tuple(name for name, option in OPTIONS.items() if metavar_of(option).endswith("FILE"))
 
 
 def _of_cell(kind: Kind, cell: str) -> Any:
@@ -46,11 +48,11 @@ def _of_cell(kind: Kind, cell: str) -> Any:
         return int(cell) if _WHOLE.fullmatch(cell) else cell
     if not isinstance(kind, Names | Gravity):
         return cell
-    found = [name for name in _SEPARATORS.split(cell) if name]
+    names = [name for name in _SEPARATORS.split(cell) if name]
     if isinstance(kind, Names):
-        return found
+        return names
     try:
-        return [float(number) for number in found]
+        return [float(number) for number in names]
     except ValueError as error:
         raise InputError("numbers belong here", came=cell, allowed="0,0,-9.81") from error
 
@@ -78,12 +80,12 @@ def of_cells(cells: Mapping[str, str], place: Callable[[str], str]) -> dict[str,
     Args:
         place: The file, line and column of a cell by its column.
     """
-    found = {}
+    options = {}
     for name, cell in cells.items():
         if cell:
             with refusals_at(place(name)):
-                found[name] = _of_cell(OPTIONS[name].kind, cell)
-    return found
+                options[name] = _of_cell(OPTIONS[name].kind, cell)
+    return options
 
 
 def checked_options(options: Mapping[str, Any], folder: Path, place: Callable[[str], str]) -> dict[str, Any]:
@@ -99,11 +101,11 @@ def checked_options(options: Mapping[str, Any], folder: Path, place: Callable[[s
     return {name: _checked(name, value, folder, place(name)) for name, value in options.items()}
 
 
-def _checked(name: str, value: Any, folder: Path, where: str) -> Any:
+def _checked(name: str, value: Any, folder: Path, place: str) -> Any:
     if name not in OPTIONS:
         raise InputError(
             "no calibration has such an option",
-            where=where,
+            where=place,
             came=name,
             allowed=", ".join(OPTIONS),
             cure=did_you_mean(name, OPTIONS),
@@ -112,24 +114,24 @@ def _checked(name: str, value: Any, folder: Path, where: str) -> Any:
     types, words = _types(kind)
     wrong = isinstance(value, str) and isinstance(kind, NumberOr) and name not in FILES and value != _other(kind)
     if not isinstance(value, types) or isinstance(value, bool) or wrong:
-        raise InputError("this is no value of this option", where=where, came=value, allowed=words)
+        raise InputError("this is no value of this option", where=place, came=value, allowed=words)
     if name in FILES and isinstance(value, str):
         if not exists(folder / value):
-            raise InputError("there is no such file", where=where, came=value, cure="Check the path.")
+            raise InputError("there is no such file", where=place, came=value, cure="Check the path.")
         return str(folder / value)
     if isinstance(kind, PayloadKind):
-        with refusals_at(where):
+        with refusals_at(place):
             kind.check(value, name)
     known = getattr(kind, "known", None) or ()
     known = known() if callable(known) else known
-    for one in value if isinstance(value, list) else [value]:
-        if known and one not in known:
+    for entry in value if isinstance(value, list) else [value]:
+        if known and entry not in known:
             raise InputError(
                 "there is nothing of this name",
-                where=where,
-                came=one,
+                where=place,
+                came=entry,
                 allowed=", ".join(known),
-                cure=did_you_mean(str(one), known),
+                cure=did_you_mean(str(entry), known),
             )
     return value
 
@@ -191,7 +193,7 @@ class Robots:
 
 
 @dataclass(frozen=True)
-class _Said:
+class _PlacedEntry:
     """An entry as it was written, with where each part of it stands."""
 
     entry: _Entry
@@ -199,11 +201,11 @@ class _Said:
     place_of_option: Callable[[str], str]
 
 
-def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path) -> Robots:
+def robots_of(stated: list[Any] | str, options: Mapping[str, Any], manifest: Path) -> Robots:
     """Return the robots that a manifest names.
 
     Args:
-        said: A list of entries, or the name of a table.
+        stated: A list of entries, or the name of a table.
         options: Of all robots that do not say others.
 
     Raises:
@@ -211,11 +213,11 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
             readings, a file that is not there, columns and options that are not known, and a date that is none.
     """
     folder, hashes = manifest.parent.absolute(), dict[str, str]()  # workers may stand elsewhere
-    if isinstance(said, str):
-        table = manifest.parent / said
-        entries, hashes[said] = _rows(table, manifest)
+    if isinstance(stated, str):
+        table = manifest.parent / stated
+        entries, hashes[stated] = _rows(table, manifest)
     else:
-        entries = [_listed(one, f"{manifest}, robots[{number}]") for number, one in enumerate(said, 1)]
+        entries = [_listed(item, f"{manifest}, robots[{number}]") for number, item in enumerate(stated, 1)]
     if not entries:
         raise InputError("there are no robots", where=f"{manifest}, robots")
     refuse_beyond("robots", len(entries), where=str(manifest))
@@ -223,23 +225,25 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
     seen: dict[str, str] = {}
     readings: dict[str, tuple[RobotEntry, str]] = {}
     robots = []
-    for one in entries:
-        entry = one.entry
-        _check_name(entry.name, one.place("name"), seen)
-        files = {entry.data: _existing(folder, entry.data, one.place("data"))}
+    for placed in entries:
+        entry = placed.entry
+        _check_name(entry.name, placed.place("name"), seen)
+        files = {entry.data: _existing(folder, entry.data, placed.place("data"))}
         robot = entry.robot
         if Path(robot).suffix:
-            files[robot] = _existing(folder, robot, one.place("robot"))
+            files[robot] = _existing(folder, robot, placed.place("robot"))
             robot = str(files[robot])
-        own = checked_options(entry.options, folder, one.place_of_option)
+        own = checked_options(entry.options, folder, placed.place_of_option)
         files |= _named_files({**options, **entry.options}, folder)
         for name, path in files.items():
             if name not in hashes:
                 hashes[name] = hash_of(read_bytes(path))
-        _check_date(entry.date, one.place("date"))
+        _check_date(entry.date, placed.place("date"))
         if entry.of is not None and not (entry.of and is_one_line(entry.of)):
-            raise InputError("a serial number belongs here", where=one.place("of"), came=entry.of, allowed="one line")
-        made = RobotEntry(
+            raise InputError(
+                "a serial number belongs here", where=placed.place("of"), came=entry.of, allowed="one line"
+            )
+        robot_entry = RobotEntry(
             entry.name,
             robot,
             folder / entry.data,
@@ -248,49 +252,49 @@ def robots_of(said: list[Any] | str, options: Mapping[str, Any], manifest: Path)
             entry.date,
             {path: hashes[name] for name, path in files.items()},
             {
-                "robot": one.place("robot"),
+                "robot": placed.place("robot"),
                 **{name: f"{manifest}, options.{name}" for name in general},
-                **{name: one.place_of_option(name) for name in own},
+                **{name: placed.place_of_option(name) for name in own},
             },
         )
-        _check_readings(made, hashes[entry.data], one.place("data"), readings)
-        robots.append(made)
-    content = [one.entry.model_dump(mode="json") | {"options": {**options, **one.entry.options}} for one in entries]
+        _check_readings(robot_entry, hashes[entry.data], placed.place("data"), readings)
+        robots.append(robot_entry)
+    content = [item.entry.model_dump(mode="json") | {"options": {**options, **item.entry.options}} for item in entries]
     return Robots(tuple(robots), hashes, content)
 
 
-def _check_readings(robot: RobotEntry, data: str, where: str, seen: dict[str, tuple[RobotEntry, str]]) -> None:
+def _check_readings(robot: RobotEntry, data: str, location: str, seen: dict[str, tuple[RobotEntry, str]]) -> None:
     """Refuse readings that stand there twice: they would count as two robots, or say that nothing has changed."""
-    other, place = seen.setdefault(data, (robot, where))
+    other, place = seen.setdefault(data, (robot, location))
     if other is robot:
         return
     campaigns = other.machine == robot.machine
     raise InputError(
         f"the same readings stand for {f'two campaigns of {robot.machine}' if campaigns else 'two robots'}, "
         f"{other.name} and {robot.name}",
-        where=where,
+        where=location,
         came=robot.data.name,
         cure=f"{place} has them too. List them once, or give the right file.",
     )
 
 
-def refuse_respelled(said: list[Any], manifest: Path) -> None:
+def refuse_respelled(stated: list[Any], manifest: Path) -> None:
     """Refuse names and serial numbers of a list that YAML takes for numbers and writes otherwise, as 0123.
 
     Raises:
         InputError: Naming the entry.
     """
     names = ("name", "of")
-    if not any(isinstance(one.get(name), int) for one in said if isinstance(one, dict) for name in names):
+    if not any(isinstance(row.get(name), int) for row in stated if isinstance(row, dict) for name in names):
         return
     from ruamel.yaml import YAML
 
     root = YAML(typ="safe", pure=True).compose(read_text(manifest, "yaml_size"))
     robots: list[Any] = next((node.value for key, node in root.value if key.value == "robots"), [])
-    for number, (one, node) in enumerate(zip(said, robots, strict=False), 1):
-        written = {key.value: entry.value for key, entry in node.value} if isinstance(one, dict) else {}
+    for number, (item, node) in enumerate(zip(stated, robots, strict=False), 1):
+        written = {key.value: entry.value for key, entry in node.value} if isinstance(item, dict) else {}
         for name in names:
-            if isinstance(one, dict) and isinstance(one.get(name), int) and written.get(name) != str(one[name]):
+            if isinstance(item, dict) and isinstance(item.get(name), int) and written.get(name) != str(item[name]):
                 raise InputError(
                     "without quotes this is a number, and its digits would be others",
                     where=f"{manifest}, robots[{number}].{name}",
@@ -299,12 +303,12 @@ def refuse_respelled(said: list[Any], manifest: Path) -> None:
                 )
 
 
-def _listed(one: object, where: str) -> _Said:
-    entry = validated(one, _Entry, where)
-    return _Said(entry, lambda part: f"{where}.{part}", lambda name: f"{where}.options.{name}")
+def _listed(content: object, place: str) -> _PlacedEntry:
+    entry = validated(content, _Entry, place)
+    return _PlacedEntry(entry, lambda part: f"{place}.{part}", lambda name: f"{place}.options.{name}")
 
 
-def _rows(table: Path, manifest: Path) -> tuple[list[_Said], str]:
+def _rows(table: Path, manifest: Path) -> tuple[list[_PlacedEntry], str]:
     """Return the rows of a table, and the SHA-256 of what was read."""
     if not exists(table):
         raise InputError("there is no such file", where=f"{manifest}, robots", came=str(table), cure="Check the path.")
@@ -327,7 +331,7 @@ def _rows(table: Path, manifest: Path) -> tuple[list[_Said], str]:
         if name not in cells.names:
             raise InputError("a column is missing", where=header, came=", ".join(cells.names), allowed=name)
     texts = {name: cells.texts(number, missing=name not in _REQUIRED) for number, name in enumerate(cells.names)}
-    made = []
+    placed = []
     for row in range(len(cells.lines)):
         line = {name: column[row] for name, column in texts.items()}
 
@@ -340,25 +344,25 @@ def _rows(table: Path, manifest: Path) -> tuple[list[_Said], str]:
             **{name: line[name] for name in _COLUMNS if line.get(name)},
             options=of_cells({name: cell for name, cell in line.items() if name in OPTIONS}, place),
         )
-        made.append(_Said(entry, place, place))
-    return made, noted[table.absolute()][0]
+        placed.append(_PlacedEntry(entry, place, place))
+    return placed, noted[table.absolute()][0]
 
 
-def _check_name(name: str, where: str, seen: dict[str, str]) -> None:
+def _check_name(name: str, place: str, seen: dict[str, str]) -> None:
     """Refuse a name that cannot be a folder's, or that another robot has; letters may be large or small there."""
     if not re.fullmatch(NAME, name) or name.endswith("."):
-        raise InputError("this cannot be a name", where=where, came=name, allowed=NAME_IN_WORDS)
-    other = seen.setdefault(name.lower(), where)
-    if other != where:
+        raise InputError("this cannot be a name", where=place, came=name, allowed=NAME_IN_WORDS)
+    other = seen.setdefault(name.lower(), place)
+    if other != place:
         raise InputError(
             "two robots have the same name",
-            where=where,
+            where=place,
             came=name,
             cure=f"{other} has it too. Give each a name of its own: measurements of one machine have the same 'of'.",
         )
 
 
-def _check_date(text: str | None, where: str) -> None:
+def _check_date(text: str | None, place: str) -> None:
     if text is None:
         return
     try:
@@ -366,22 +370,22 @@ def _check_date(text: str | None, where: str) -> None:
             date.fromisoformat(text)
             return
     except ValueError as error:
-        raise InputError("there is no such day", where=where, came=text, allowed=_DATES) from error
-    raise InputError("this is no date", where=where, came=text, allowed=_DATES)
+        raise InputError("there is no such day", where=place, came=text, allowed=_DATES) from error
+    raise InputError("this is no date", where=place, came=text, allowed=_DATES)
 
 
-def _existing(folder: Path, name: str, where: str) -> Path:
+def _existing(folder: Path, name: str, place: str) -> Path:
     """Return a file that is named, or refuse one that is not there."""
     path = folder / name
     if exists(path):
         return path
     try:
-        near = nearest_names(path.name, [one.name for one in path.parent.iterdir()], count=2, likeness=0.75)
+        near = nearest_names(path.name, [file.name for file in path.parent.iterdir()], count=2, likeness=0.75)
     except OSError:
         near = []
     raise InputError(
         "there is no such file",
-        where=where,
+        where=place,
         came=name,
         cure=f"Did you mean {' or '.join(near)}?" if near else "Check the path.",
     )

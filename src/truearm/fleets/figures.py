@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.document.drawing import AFTER, BEFORE, Figure, axis, figure, logarithmic_axis, rounded, significant
-from truearm.fleets.analysis import LEAST_COMPARED, Analysis, Errors, KindFound
+from truearm.fleets.analysis import LEAST_COMPARED, Analysis, Errors, KindAnalysis
 from truearm.fleets.drift import Drift
 
 _ALARM: Final = "#b3261e"
@@ -23,7 +23,7 @@ _BINS: Final = 40
 #: Robots that differ and are drawn beside boxes.
 _MOST_MARKS: Final = 300
 #: Informed share from which on a parameter is drawn: two that are told together have half each.
-_TOLD: Final = 0.4
+_DRAWN_SHARE: Final = 0.4
 #: Legends of many entries, where no toolbar comes to lie upon them.
 _BELOW: Final = {"orientation": "h", "x": 0, "y": 0, "yref": "container", "xanchor": "left", "yanchor": "bottom"}
 #: A value so many times as far out as the others is not drawn at its place, but at the edge.
@@ -34,36 +34,36 @@ _NAMED: Final = 3
 _LOGARITHMIC: Final = 15.0
 
 
-def fleet_figures(found: Analysis) -> dict[str, Figure]:
+def fleet_figures(analysis: Analysis) -> dict[str, Figure]:
     """Return the pictures of a fleet by their places on the page."""
     figures = {}
-    if found.errors:
-        figures["accuracy"] = accuracy_figure(found)
-    judged = found.errors.get("held_out")
+    if analysis.errors:
+        figures["accuracy"] = accuracy_figure(analysis)
+    judged = analysis.errors.get("held_out")
     if judged is not None and len(judged.mean) >= LEAST_COMPARED:
         figures["histogram"] = histogram_figure(judged)
-    if found.kinds:
-        kind = found.kinds[0]
+    if analysis.kinds:
+        kind = analysis.kinds[0]
         if len(_drawn(kind)):
             figures["parameters"] = parameters_figure(kind)
         if any(spread.spread is not None for spread in kind.spreads):
             figures["spread"] = spread_figure(kind)
     for unit, name in (("m", "drift-lengths"), ("rad", "drift-angles")):
-        changes = shown_drifts(found, unit)
+        changes = shown_drifts(analysis, unit)
         if changes:
             figures[name] = drift_figure(changes)
     return figures
 
 
-def accuracy_figure(found: Analysis) -> Figure:
+def accuracy_figure(analysis: Analysis) -> Figure:
     """Show the mean errors of the robots, the most accurate first, before and after calibration."""
     names = {"nominal": ("nominal", BEFORE), "held_out": ("calibrated, held out", AFTER)}
     traces = []
     low, high = np.inf, 0.0
     for name, (words, colour) in names.items():
-        if name not in found.errors:
+        if name not in analysis.errors:
             continue
-        values = np.sort(found.errors[name].mean) * 1e3
+        values = np.sort(analysis.errors[name].mean) * 1e3
         count = len(values)
         share = 100.0 * (np.arange(count) + 0.5) / count
         if count > _EACH:
@@ -114,11 +114,13 @@ def histogram_figure(errors: Errors) -> Figure:
     words = []
     if len(beyond):
         worst = beyond[np.argsort(-whole[beyond])]
-        told = ", ".join(f"{html.escape(errors.names[i])} {significant(whole[i])} mm" for i in worst[:_NAMED].tolist())
+        farthest = ", ".join(
+            f"{html.escape(errors.names[i])} {significant(whole[i])} mm" for i in worst[:_NAMED].tolist()
+        )
         more = f" and {len(beyond) - _NAMED} more" if len(beyond) > _NAMED else ""
         words = [
             {
-                "text": f"beyond: {told}{more}",
+                "text": f"beyond: {farthest}{more}",
                 "xref": "paper",
                 "yref": "paper",
                 "x": 0,
@@ -132,15 +134,15 @@ def histogram_figure(errors: Errors) -> Figure:
     return figure([trace], 300, xaxis=x, yaxis=axis("robots"), bargap=0, annotations=words)
 
 
-def _drawn(found: KindFound) -> NDArray[np.intp]:
+def _drawn(analysis: KindAnalysis) -> NDArray[np.intp]:
     """Return the parameters that are worth a look: the readings tell much of them, or a robot differs in them."""
-    differ = np.isin(np.array(found.kind.parameters), [difference.parameter for difference in found.differences])
-    return np.flatnonzero((found.kind.share > _TOLD) | differ)
+    differ = np.isin(np.array(analysis.kind.parameters), [difference.parameter for difference in analysis.differences])
+    return np.flatnonzero((analysis.kind.share > _DRAWN_SHARE) | differ)
 
 
-def parameters_figure(found: KindFound) -> Figure:
+def parameters_figure(analysis: KindAnalysis) -> Figure:
     """Show how far each parameter of each robot is from nominal, in its prior; of many robots as boxes."""
-    kind, chosen = found.kind, _drawn(found)
+    kind, chosen = analysis.kind, _drawn(analysis)
     rows = kind.latest
     values = kind.undrawn[0][np.ix_(rows, chosen)] / kind.prior[chosen]
     names = [html.escape(kind.parameters[i]) for i in chosen.tolist()]
@@ -171,7 +173,7 @@ def parameters_figure(found: KindFound) -> Figure:
     column_of = {kind.parameters[column]: place for place, column in enumerate(chosen.tolist())}
     marks = [
         (difference, (row_of[difference.robot], column_of[difference.parameter]))
-        for difference in found.differences[:_MOST_MARKS]
+        for difference in analysis.differences[:_MOST_MARKS]
     ]
     if marks:
         sizes = [values[place] for _, place in marks]
@@ -180,9 +182,9 @@ def parameters_figure(found: KindFound) -> Figure:
                 "type": "scatter",
                 "mode": "markers",
                 "name": "differs",
-                "x": [html.escape(one.parameter) for one, _ in marks],
+                "x": [html.escape(difference.parameter) for difference, _ in marks],
                 "y": rounded(np.array([shown[place] for _, place in marks]), 4),
-                "text": [html.escape(one.robot) for one, _ in marks],
+                "text": [html.escape(difference.robot) for difference, _ in marks],
                 "customdata": rounded(np.array(sizes), 4),
                 "marker": {"size": 11, "color": _ALARM, "symbol": [_symbol(size, edge) for size in sizes]},
                 "hovertemplate": "%{text}, %{x}: %{customdata} of its prior<extra></extra>",
@@ -245,16 +247,21 @@ def _symbol(value: float, edge: float) -> str:
     return "triangle-up" if value > 0.0 else "triangle-down"
 
 
-def spread_figure(found: KindFound) -> Figure:
+def spread_figure(analysis: KindAnalysis) -> Figure:
     """Show how far parameters scatter over the series, in their priors, with intervals of 95 %."""
-    told = [one for one in found.spreads if one.spread is not None]
-    prior = np.array([one.prior for one in told])
-    spread, low, high = np.array([(one.spread, one.low, one.high) for one in told], dtype=float).T / prior
-    colours = [AFTER if one.verdict == "agrees" else _ALARM if one.verdict == "wider" else "#8a6d1d" for one in told]
+    known = [parameter for parameter in analysis.spreads if parameter.spread is not None]
+    prior = np.array([parameter.prior for parameter in known])
+    spread, low, high = (
+        np.array([(parameter.spread, parameter.low, parameter.high) for parameter in known], dtype=float).T / prior
+    )
+    colours = [
+        AFTER if parameter.verdict == "agrees" else _ALARM if parameter.verdict == "wider" else "#8a6d1d"
+        for parameter in known
+    ]
     trace = {
         "type": "scatter",
         "mode": "markers",
-        "x": [html.escape(one.parameter) for one in told],
+        "x": [html.escape(parameter.parameter) for parameter in known],
         "y": rounded(spread, 4),
         "error_y": {
             "type": "data",
@@ -287,11 +294,11 @@ def spread_figure(found: KindFound) -> Figure:
     )
 
 
-def shown_drifts(found: Analysis, unit: str) -> list[Drift]:
+def shown_drifts(analysis: Analysis, unit: str) -> list[Drift]:
     """Return the changes that are drawn: the surest of a unit, those that are more than chance before others."""
-    those = [drift for drift in found.drifts if drift.unit == unit]
-    sure = [one for one in those if one.significant]
-    return sorted(sure or those, key=lambda one: -abs(one.times))[: len(_LINES) if sure else 3]
+    those = [drift for drift in analysis.drifts if drift.unit == unit]
+    sure = [drift for drift in those if drift.significant]
+    return sorted(sure or those, key=lambda drift: -abs(drift.times))[: len(_LINES) if sure else 3]
 
 
 def drift_figure(changes: list[Drift]) -> Figure:

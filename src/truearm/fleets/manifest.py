@@ -30,16 +30,16 @@ if TYPE_CHECKING:
     from truearm.fleets.entries import RobotEntry
 
 
-def experiment(asked: ExperimentEntry, where: str = "experiment") -> Experiment:
-    """Prepare an experiment; refusals name `where` it stands.
+def experiment(asked: ExperimentEntry, place: str = "experiment") -> Experiment:
+    """Prepare an experiment; refusals name the `place` where it stands.
 
     Raises:
         InputError: For a robot or configurations that cannot be read, a model that is not known, and targets that are
             not there.
     """
-    with _refusals_at(f"{where}.robot"):
+    with _refusals_at(f"{place}.robot"):
         nominal = load_robot(asked.robot)
-    with _refusals_at(f"{where}.model"):
+    with _refusals_at(f"{place}.model"):
         model = named_model(asked.model)
     known = carrying_targets(nominal)
     places = {target.name: tuple(known.values[target.parameter(axis)] for axis in "xyz") for target in known.targets}
@@ -47,7 +47,7 @@ def experiment(asked: ExperimentEntry, where: str = "experiment") -> Experiment:
         raise InputError(
             f"{nominal.name} has fewer targets",
             parameter="manifest",
-            where=f"{where}.targets",
+            where=f"{place}.targets",
             came=asked.targets,
             allowed=f"1 to {len(places)}",
         )
@@ -57,9 +57,9 @@ def experiment(asked: ExperimentEntry, where: str = "experiment") -> Experiment:
     if isinstance(asked.configurations, int):
         joints = robot.random_configurations(asked.configurations, rng)
     else:
-        with _refusals_at(f"{where}.configurations"):
+        with _refusals_at(f"{place}.configurations"):
             joints = in_model_joints(robot, read_csv(asked.configurations)).joints
-    with _refusals_at(f"{where}.model"):
+    with _refusals_at(f"{place}.model"):
         model.free(model.prepared(robot))
     return Experiment(asked, robot, joints, held_out)
 
@@ -100,9 +100,9 @@ MEASURED_TOGETHER: Final = 8
 Count = Annotated[int, Field(ge=1, strict=True)]
 
 
-def _configurations(said: object) -> int | str:
-    if (isinstance(said, str) and said) or (type(said) is int and said >= 1):
-        return said
+def _configurations(stated: object) -> int | str:
+    if (isinstance(stated, str) and stated) or (type(stated) is int and stated >= 1):
+        return stated
     raise InputError(
         "a number of configurations or a file of them belongs here", allowed="1 or more, or a file such as plan.csv"
     )
@@ -174,8 +174,8 @@ class Manifest:
     @property
     def digest(self) -> str:
         """Hash of what is asked, and of the files that it names."""
-        told = json.dumps([self.content, self.hashes], sort_keys=True, default=str)
-        return hash_of(told.encode())
+        text = json.dumps([self.content, self.hashes], sort_keys=True, default=str)
+        return hash_of(text.encode())
 
     def key(self, part: int) -> str:
         """Return the hash of what is asked of a part, counted from 0: robots beside it change nothing of it."""
@@ -195,11 +195,11 @@ class Manifest:
             return [self.experiment.name(number) for number in self.numbers(part)]
         return [self.robots[number].name for number in self.numbers(part)]
 
-    def said(self, part: int) -> list[tuple[str, str | None, str | None]]:
+    def identities(self, part: int) -> list[tuple[str, str | None, str | None]]:
         """Return name, machine and date of the robots in a part, as its rows repeat them."""
         if self.experiment is not None:
             return [(name, None, None) for name in self.names(part)]
-        return [(one.name, one.of, one.date) for one in (self.robots[number] for number in self.numbers(part))]
+        return [(robot.name, robot.of, robot.date) for robot in (self.robots[number] for number in self.numbers(part))]
 
 
 def read_manifest(path: Path) -> Manifest:
@@ -209,48 +209,48 @@ def read_manifest(path: Path) -> Manifest:
         InputError: For what cannot be meant, naming the entry: no robots or both kinds, two robots of one name, a
             missing file.
     """
-    said = read_yaml(path, ManifestFile)
-    if (said.experiment is None) == (said.robots is None):
+    entries = read_yaml(path, ManifestFile)
+    if (entries.experiment is None) == (entries.robots is None):
         raise InputError(
             "robots that were measured or an experiment belong here, one of them",
             where=str(path),
-            came="both" if said.robots is not None else "neither",
+            came="both" if entries.robots is not None else "neither",
             allowed="robots, experiment",
         )
-    content = said.model_dump(mode="json")
-    if said.experiment is not None:
-        experiment, hashes = _experiment(said, path)
-        return Manifest(path, experiment, (), said.chunk or SIMULATED_TOGETHER, content, hashes)
-    if said.units is not None:
+    content = entries.model_dump(mode="json")
+    if entries.experiment is not None:
+        experiment, hashes = _experiment(entries, path)
+        return Manifest(path, experiment, (), entries.chunk or SIMULATED_TOGETHER, content, hashes)
+    if entries.units is not None:
         raise InputError("nothing here has a unit", where=f"{path}, units", cure="Remove it.")
     from truearm.fleets.entries import refuse_respelled, robots_of
 
-    if isinstance(said.robots, list):
-        refuse_respelled(said.robots, path)
-    named = robots_of(said.robots or [], said.options, path)
+    if isinstance(entries.robots, list):
+        refuse_respelled(entries.robots, path)
+    named = robots_of(entries.robots or [], entries.options, path)
     content |= {"robots": named.content}
-    return Manifest(path, None, named.entries, said.chunk or MEASURED_TOGETHER, content, named.hashes)
+    return Manifest(path, None, named.entries, entries.chunk or MEASURED_TOGETHER, content, named.hashes)
 
 
-def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[str, str]]:
+def _experiment(entries: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[str, str]]:
     """Return the experiment, and the SHA-256 of the files that it names."""
-    asked = said.experiment
+    asked = entries.experiment
     assert asked is not None
-    if said.units is None:
+    if entries.units is None:
         raise InputError(
             "the noise has a unit, and it is not said",
             where=f"{path}, units",
             allowed="{length: mm}, {length: m} or {length: um}",
             cure="Add it.",
         )
-    if said.options:
+    if entries.options:
         raise InputError("only robots that were measured have options", where=f"{path}, options", cure="Remove it.")
-    for name, entry, came in (
+    for name, entry, value in (
         ("robots", "count", asked.count),
         ("poses", "held_out", asked.held_out),
         ("poses", "configurations", asked.configurations if isinstance(asked.configurations, int) else 0),
     ):
-        refuse_beyond(name, came, where=f"{path}, experiment.{entry}")
+        refuse_beyond(name, value, where=f"{path}, experiment.{entry}")
     hashes = {}
     robot = asked.robot
     if Path(robot).suffix:
@@ -261,7 +261,7 @@ def _experiment(said: ManifestFile, path: Path) -> tuple[ExperimentEntry, dict[s
         hashes[asked.configurations] = _hash(asked.configurations, path, "configurations")
         configurations = path.parent / asked.configurations
     with refusals_at(f"{path}, experiment.noise"):
-        noise = sized_si(asked.noise, said.units.length, deviation=True)
+        noise = sized_si(asked.noise, entries.units.length, deviation=True)
     return (
         ExperimentEntry(
             robot, asked.count, configurations, asked.targets, asked.model, noise, asked.held_out, asked.seed

@@ -114,9 +114,9 @@ def said_of(line: bytes) -> dict[str, Any]:
 
 def rows_of(lines: bytes) -> list[dict[str, Any]]:
     """Return the robots of a part, one a line, or raise ValueError."""
-    found = [*_ROWS.validate_json(b"[" + lines.rstrip(b"\n").replace(b"\n", b",") + b"]")]
-    for row in found:
+    rows = [*_ROWS.validate_json(b"[" + lines.rstrip(b"\n").replace(b"\n", b",") + b"]")]
+    for row in rows:
         calibrated = row["status"] == "calibrated"
         if calibrated == bool(row["message"]):
             raise ValueError("a reason belongs to what failed")
-    return found
+    return rows

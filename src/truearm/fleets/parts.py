@@ -53,16 +53,16 @@ def finished(task: Task) -> Finished:
     else:
         from truearm.fleets.robots import calibrated_robot  # with all that a calibration needs, only for these
 
-        done = [calibrated_robot(entry, task.folder) for entry in task.robots]
-        rows = [one.row for one in done]
-        written = [name for one in done for name in one.written]
-        text = part_text(rows, {}, written, [one.row.name for one in done if one.changed])
+        calibrated = [calibrated_robot(entry, task.folder) for entry in task.robots]
+        rows = [robot.row for robot in calibrated]
+        written = [name for robot in calibrated for name in robot.written]
+        text = part_text(rows, {}, written, [robot.row.name for robot in calibrated if robot.changed])
     return Finished(text, sum(row.status == "failed" for row in rows))
 
 
 @lru_cache(maxsize=2)
 def _series(pickled: bytes) -> Series:
     """Return a series that this process has made already, for the parts that follow."""
-    made = pickle.loads(pickled)
-    assert isinstance(made, Experiment)
-    return Series(made)
+    asked = pickle.loads(pickled)
+    assert isinstance(asked, Experiment)
+    return Series(asked)

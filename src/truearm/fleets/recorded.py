@@ -50,7 +50,7 @@ def refuse_link(folder: Path) -> None:
 class Known:
     """Which parts of a fleet are on disk."""
 
-    done: frozenset[int]  #: Numbers of those that are not computed again, counted from 0.
+    finished: frozenset[int]  #: Numbers of those that are not computed again, counted from 0.
     again: tuple[str, ...] = ()  #: Why others are, in plain words.
 
 
@@ -176,8 +176,8 @@ class Recorded:
             if known is None or known.get("digest") != self.manifest.digest:
                 removed = self._remove_corrected() if known is not None else ()
                 write_text(self.folder / RECORD, json.dumps(self._record(), indent=1, default=str) + "\n")
-            found = self.known()
-            yield Known(found.done, (*removed, *found.again))
+            parts = self.known()
+            yield Known(parts.finished, (*removed, *parts.again))
 
     def _remove_corrected(self) -> tuple[str, ...]:
         """Remove the parts with robots whose entries or files are others than they were computed from."""
@@ -216,7 +216,7 @@ class Recorded:
         Raises:
             InputError: Naming a part that somebody has changed.
         """
-        done, again = set[int](), list[str]()
+        finished, again = set[int](), list[str]()
         for part in self.on_disk():
             head = self._checked(part)[0]
             gone = [name for name in head["written"] if not exists(self.folder / name)]
@@ -227,8 +227,8 @@ class Recorded:
             elif gone:
                 again.append(f"1 part computed again, because files of it are missing: {listed(gone)}")
             else:
-                done.add(part)
-        return Known(frozenset(done), tuple(again))
+                finished.add(part)
+        return Known(frozenset(finished), tuple(again))
 
     def missing(self) -> int:
         """Return how many parts are to be computed; all of them where another manifest goes on.
@@ -243,7 +243,7 @@ class Recorded:
         with self._locked():
             known = self._recorded()
             same = known is not None and known.get("digest") == self.manifest.digest
-            return self.manifest.parts - (len(self.known().done) if same else 0)
+            return self.manifest.parts - (len(self.known().finished) if same else 0)
 
     def on_disk(self) -> list[int]:
         """Return which parts have a file, in their order."""
@@ -259,18 +259,18 @@ class Recorded:
         Raises:
             ValueError: If it is not what belongs to the robots of this part: then nothing is written.
         """
-        first, _, rest = text.encode().partition(b"\n")
-        said = said_of(first)
-        self._refuse_foreign(part, said)
-        self._made(part, said, rest)
+        first, _, lines = text.encode().partition(b"\n")
+        stated = said_of(first)
+        self._refuse_foreign(part, stated)
+        self._validated(part, stated, lines)
         head = {
             "truearm": _PART_SCHEMA,
             "key": self._key(part),
             "part": part + 1,
             "robots": len(self.manifest.numbers(part)),
-            **said,
+            **stated,
         }
-        whole = f"{json.dumps(head)}\n{rest.decode()}"
+        whole = f"{json.dumps(head)}\n{lines.decode()}"
         write_text(self.file(part), f"{whole}{json.dumps({'sha256': hash_of(whole.encode())})}\n")
 
     def rows(self) -> Iterator[Row]:
@@ -285,15 +285,15 @@ class Recorded:
     def _rows(self, part: int) -> list[Row]:
         head, lines = self._checked(part)
         try:
-            return self._made(part, head, lines)
+            return self._validated(part, head, lines)
         except (ValueError, TypeError, RecursionError) as error:
             raise self._not_ours(part) from error
 
-    def _made(self, part: int, head: Mapping[str, Any], lines: bytes) -> list[Row]:
+    def _validated(self, part: int, head: Mapping[str, Any], lines: bytes) -> list[Row]:
         """Return the robots of a part, or raise ValueError if they are not those that the manifest has there."""
         shared = {kind: tuple(column) for kind, column in head["shared"].items()}
         rows = [Row.read(row, shared) for row in rows_of(lines)]
-        if [(row.name, row.of, row.date) for row in rows] != self.manifest.said(part):
+        if [(row.name, row.of, row.date) for row in rows] != self.manifest.identities(part):
             raise ValueError("these are other robots")
         return rows
 
@@ -316,11 +316,11 @@ class Recorded:
         whole, _, last = content.removesuffix(b"\n").rpartition(b"\n")
         head = self._head(content, part)
         try:
-            told = from_json(last)["sha256"]
+            stated_hash = from_json(last)["sha256"]
             self._refuse_foreign(part, head)
         except (ValueError, KeyError, TypeError) as error:
             raise self._not_ours(part) from error
-        if told != hash_of(whole + b"\n") or head["key"] != self._key(part):
+        if stated_hash != hash_of(whole + b"\n") or head["key"] != self._key(part):
             raise self._not_ours(part)
         if (head["part"], head["robots"]) != (part + 1, len(self.manifest.numbers(part))):
             raise self._not_ours(part)

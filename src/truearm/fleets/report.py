@@ -24,7 +24,7 @@ from truearm.fleets.figures import figures_text, fleet_figures
 from truearm.fleets.words import PRIORS_FILE, difference_words, outcome_words, reason_words, together_words
 
 if TYPE_CHECKING:
-    from truearm.fleets.analysis import Analysis, KindFound
+    from truearm.fleets.analysis import Analysis, KindAnalysis
     from truearm.fleets.drift import Drift, Quantile
     from truearm.fleets.result import Fleet
 
@@ -43,51 +43,51 @@ _VERDICTS: Final = {
 }
 
 
-def fleet_html(found: Fleet) -> str:
+def fleet_html(fleet: Fleet) -> str:
     """Return the page of a fleet."""
-    said = found.analysis
-    title = found.recorded.manifest.file.stem
-    simulated = found.recorded.manifest.experiment is not None
-    drawn = fleet_figures(said)
-    measured = f", {said.measurements} measurements" if said.measurements != said.machines else ""
-    outcome = outcome_words(said) if said.left_out else f"{len(said.failed)} not calibrated"
-    robots = "robot" if said.machines == 1 else "robots"
+    analysis = fleet.analysis
+    title = fleet.recorded.manifest.file.stem
+    simulated = fleet.recorded.manifest.experiment is not None
+    drawn = fleet_figures(analysis)
+    measured = f", {analysis.measurements} measurements" if analysis.measurements != analysis.machines else ""
+    outcome = outcome_words(analysis) if analysis.left_out else f"{len(analysis.failed)} not calibrated"
+    robots = "robot" if analysis.machines == 1 else "robots"
     return Document(
         f"Fleet {title}",
         [
-            Section("", [*_lead(said, found.draw), *warned(found.warnings)], "result"),
-            *_looks(said, simulated=simulated),
-            *_accuracy(said, drawn),
-            *_parameters(found, drawn),
-            *_drifts(said, drawn),
+            Section("", [*_lead(analysis, fleet.draw), *warned(fleet.warnings)], "result"),
+            *_looks(analysis, simulated=simulated),
+            *_accuracy(analysis, drawn),
+            *_parameters(fleet, drawn),
+            *_drifts(analysis, drawn),
         ],
-        found.command or "",
-        subtitle=f"{said.machines} {robots}{' simulated' if simulated else ''}{measured}, {outcome}.",
-    ).html(found)
+        fleet.command or "",
+        subtitle=f"{analysis.machines} {robots}{' simulated' if simulated else ''}{measured}, {outcome}.",
+    ).html(fleet)
 
 
-def _lead(said: Analysis, draw: str | None) -> list[Lead]:
+def _lead(analysis: Analysis, draw: str | None) -> list[Lead]:
     """Return the figure that people look for: the error of the middle of the series, before and after."""
-    after = said.errors.get("held_out")
+    after = analysis.errors.get("held_out")
     if after is None:
         return []
-    before = said.errors.get("nominal")
+    before = analysis.errors.get("nominal")
     middle, was = after.of_means[0], ""
     if before is not None and before.of_means[0].value is not None:
         was = _mm(before.of_means[0].value)
     count = len(after.mean)
     words = (
         "Mean error on configurations that no calibration has seen, of the robot in the middle of "
-        f"{'the series' if count == said.machines else f'{count} robots'}{', before and after' if was else ''}. "
+        f"{'the series' if count == analysis.machines else f'{count} robots'}{', before and after' if was else ''}. "
         f"The worst robot has {_mm(float(after.mean.max()))} mm.{f' {draw}.' if draw else ''}"
     )
-    now = _mm(middle.value if middle.value is not None else float(after.mean.mean()))
-    return [Lead([Words(words)], now, was, "mm")]
+    calibrated = _mm(middle.value if middle.value is not None else float(after.mean.mean()))
+    return [Lead([Words(words)], calibrated, was, "mm")]
 
 
-def _looks(said: Analysis, *, simulated: bool) -> list[Section]:
+def _looks(analysis: Analysis, *, simulated: bool) -> list[Section]:
     """Return which robots to look at, with links to their reports."""
-    if not said.looks:
+    if not analysis.looks:
         return []
     rows = [
         (
@@ -97,20 +97,20 @@ def _looks(said: Analysis, *, simulated: bool) -> list[Section]:
             ),
             "; ".join(map(reason_words, look.reasons)),
         )
-        for look in said.looks[:_ROWS]
+        for look in analysis.looks[:_ROWS]
     ]
     table = Table(("robot", "why"), rows, texts=(1,), look="looks")
-    return [Section("Look at these first", [table, *_and_more(len(said.looks))], "looks")]
+    return [Section("Look at these first", [table, *_and_more(len(analysis.looks))], "looks")]
 
 
 def _and_more(count: int) -> list[Words]:
     return [Words(f"And {count - _ROWS} more, in fleet.json.", quiet=True)] if count > _ROWS else []
 
 
-def _accuracy(said: Analysis, drawn: dict[str, Figure]) -> list[Section]:
+def _accuracy(analysis: Analysis, drawn: dict[str, Figure]) -> list[Section]:
     if "accuracy" not in drawn:
         return []
-    heading = [(f"{_COLUMNS[name]} ({len(errors.mean)})", "95 %") for name, errors in said.errors.items()]
+    heading = [(f"{_COLUMNS[name]} ({len(errors.mean)})", "95 %") for name, errors in analysis.errors.items()]
     words = (
         "Intervals lie between two of the errors that were found (order statistics), so they assume nothing of how "
         "errors are distributed; they are about a series of which these robots are a random sample. A machine that was "
@@ -122,7 +122,7 @@ def _accuracy(said: Analysis, drawn: dict[str, Figure]) -> list[Section]:
             [
                 Words("The mean error of each robot over its held-out configurations."),
                 *(Picture(name, drawn[name]) for name in ("accuracy", "histogram") if name in drawn),
-                Table(("mean error [mm]", *chain(*heading)), _shares(said), look="spread", wide=True),
+                Table(("mean error [mm]", *chain(*heading)), _shares(analysis), look="spread", wide=True),
                 Words(words, quiet=True),
             ],
             "errors",
@@ -130,11 +130,11 @@ def _accuracy(said: Analysis, drawn: dict[str, Figure]) -> list[Section]:
     ]
 
 
-def _parameters(found: Fleet, drawn: dict[str, Figure]) -> list[Section]:
+def _parameters(fleet: Fleet, drawn: dict[str, Figure]) -> list[Section]:
     """Return what the parameters of the kind with most robots say."""
-    if not found.analysis.kinds:
+    if not fleet.analysis.kinds:
         return []
-    kind, *others = found.analysis.kinds
+    kind, *others = fleet.analysis.kinds
     blocks: list[Block] = []
     if others:
         names = ", ".join(each.kind.robot for each in others)
@@ -163,7 +163,7 @@ def _parameters(found: Fleet, drawn: dict[str, Figure]) -> list[Section]:
     rows = [_spread(spread, kind) for spread in kind.spreads]
     table = Table(heading, rows, texts=(1, 7), look="parameters sortable", wide=True)
     blocks.append(Folded("Every parameter beside its prior", [table], open="spread" in drawn))
-    if found.proposed is not None:
+    if fleet.proposed is not None:
         words = (
             f"{PRIORS_FILE} is the nominal robot with the proposed priors: give it to calibrations of further robots "
             "of this series, or to an experiment."
@@ -172,22 +172,22 @@ def _parameters(found: Fleet, drawn: dict[str, Figure]) -> list[Section]:
     return [Section(f"Parameters of {kind.kind.robot}", blocks, "parameters-section")]
 
 
-def _drifts(said: Analysis, drawn: dict[str, Figure]) -> list[Section]:
-    if not said.drifts:
+def _drifts(analysis: Analysis, drawn: dict[str, Figure]) -> list[Section]:
+    if not analysis.drifts:
         return []
-    unseen = said.kinds[0].drifts.unknown if said.kinds else []
+    unseen = analysis.kinds[0].drifts.unknown if analysis.kinds else []
     words = "Chance counts all parameters of all machines that were compared."
     if unseen:
         words = f"No change can be seen of {', '.join(unseen)}: base or target may have moved instead. {words}"
     heading = ("machine", "parameter", "campaigns", "months", "change", "a month", "95 %", "verdict")
-    rows = [_change(drift) for drift in said.drifts[:_ROWS]]
+    rows = [_change(drift) for drift in analysis.drifts[:_ROWS]]
     return [
         Section(
             "Machines measured again",
             [
                 *(Picture(name, drawn[name]) for name in ("drift-lengths", "drift-angles") if name in drawn),
                 Table(heading, rows, texts=(1, 7), look="parameters", wide=True),
-                *_and_more(len(said.drifts)),
+                *_and_more(len(analysis.drifts)),
                 Words(words, quiet=True),
             ],
             "drift",
@@ -199,51 +199,55 @@ def _mm(length: float) -> str:
     return significant(length * 1e3)
 
 
-def _shares(said: Analysis) -> list[tuple[str, ...]]:
+def _shares(analysis: Analysis) -> list[tuple[str, ...]]:
     """Return the rows of the table of accuracy: errors below which a share of the robots is, with intervals."""
-    columns = [errors.of_means for errors in said.errors.values()]
+    columns = [errors.of_means for errors in analysis.errors.values()]
     rows = [(f"{ones[0].share * 100:g} % below", *chain(*map(_share, ones))) for ones in zip(*columns, strict=True)]
-    worst = [(_mm(float(errors.mean.max())), "") for errors in said.errors.values()]
+    worst = [(_mm(float(errors.mean.max())), "") for errors in analysis.errors.values()]
     return [*rows, ("the worst", *chain(*worst))]
 
 
-def _share(one: Quantile) -> tuple[str, str]:
-    if one.value is None:
-        return "not known", f"takes {one.needed} robots"
-    if one.low is not None and one.high is not None:
-        return _mm(one.value), f"{_mm(one.low)} to {_mm(one.high)}"
-    if one.low is not None:
-        return _mm(one.value), f"above {_mm(one.low)}"
-    return _mm(one.value), f"takes {one.needed} robots" if one.high is None else f"below {_mm(one.high)}"
+def _share(quantile: Quantile) -> tuple[str, str]:
+    if quantile.value is None:
+        return "not known", f"takes {quantile.needed} robots"
+    if quantile.low is not None and quantile.high is not None:
+        return _mm(quantile.value), f"{_mm(quantile.low)} to {_mm(quantile.high)}"
+    if quantile.low is not None:
+        return _mm(quantile.value), f"above {_mm(quantile.low)}"
+    return _mm(
+        quantile.value
+    ), f"takes {quantile.needed} robots" if quantile.high is None else f"below {_mm(quantile.high)}"
 
 
-def _spread(one: ParameterSpread, found: KindFound) -> tuple[str | Cell, ...]:
-    number = found.kind.parameters.index(one.parameter)
-    together = found.kind.together(number)
-    words = f"told with {', '.join(together)} only" if together else _VERDICTS[one.verdict]
-    low, high = figures_text(one.low, one.unit), figures_text(one.high, one.unit)
-    look = "differs" if one.verdict == "wider" else "" if one.verdict in ("agrees", "narrower") else "untold"
+def _spread(spread: ParameterSpread, analysis: KindAnalysis) -> tuple[str | Cell, ...]:
+    number = analysis.kind.parameters.index(spread.parameter)
+    together = analysis.kind.together(number)
+    words = f"told with {', '.join(together)} only" if together else _VERDICTS[spread.verdict]
+    low, high = figures_text(spread.low, spread.unit), figures_text(spread.high, spread.unit)
+    look = "differs" if spread.verdict == "wider" else "" if spread.verdict in ("agrees", "narrower") else "untold"
     return (
-        Cell(one.parameter, code=True),
-        SHOWN_AS[one.unit],
-        figures_text(one.prior, one.unit),
-        figures_text(one.spread, one.unit),
-        "" if one.spread is None else f"{low} to {high}",
-        Cell(figures_text(one.mean, one.unit), look="differs" if one.beside else ""),
-        figures_text(one.proposed, one.unit),
+        Cell(spread.parameter, code=True),
+        SHOWN_AS[spread.unit],
+        figures_text(spread.prior, spread.unit),
+        figures_text(spread.spread, spread.unit),
+        "" if spread.spread is None else f"{low} to {high}",
+        Cell(figures_text(spread.mean, spread.unit), look="differs" if spread.beside else ""),
+        figures_text(spread.proposed, spread.unit),
         Cell(words, look=look),
     )
 
 
-def _change(one: Drift) -> tuple[str | Cell, ...]:
-    words = "changed" if one.significant else "no more than chance"
+def _change(drift: Drift) -> tuple[str | Cell, ...]:
+    words = "changed" if drift.significant else "no more than chance"
     return (
-        one.machine,
-        Cell(together_words(one), code=True),
-        str(one.campaigns),
-        f"{one.months:.1f}",
-        f"{figures_text(one.change, one.unit)} {SHOWN_AS[one.unit]}",
-        figures_text(one.slope, one.unit),
-        f"{figures_text(one.low, one.unit)} to {figures_text(one.high, one.unit)}",
-        Cell(words + ("" if one.steady is not False else ", not steadily"), look="differs" if one.significant else ""),
+        drift.machine,
+        Cell(together_words(drift), code=True),
+        str(drift.campaigns),
+        f"{drift.months:.1f}",
+        f"{figures_text(drift.change, drift.unit)} {SHOWN_AS[drift.unit]}",
+        figures_text(drift.slope, drift.unit),
+        f"{figures_text(drift.low, drift.unit)} to {figures_text(drift.high, drift.unit)}",
+        Cell(
+            words + ("" if drift.steady is not False else ", not steadily"), look="differs" if drift.significant else ""
+        ),
     )

@@ -15,7 +15,7 @@ from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.base.files import exists
 from truearm.engine.base.units import Marked
 from truearm.engine.base.writing import output_folder, write_files
-from truearm.engine.document.document import Block, detail, held_by, say
+from truearm.engine.document.document import Block, detail, json_of, say
 from truearm.engine.document.records import Record
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot import Robot
@@ -76,9 +76,9 @@ class Fleet(Record):
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """What to know about the result, in plain words."""
-        found = []
+        notices = []
         if self.run.lost:
-            found.append(
+            notices.append(
                 WORKERS_DIED(
                     f"Workers died again and again of parts with {counted(len(self.run.lost), 'robot')} "
                     f"({listed(self.run.lost)}), and these are not in the result."
@@ -87,7 +87,7 @@ class Fleet(Record):
         failed = self.analysis.failed
         if failed:
             names = listed([name for name, _ in failed])
-            found.append(
+            notices.append(
                 ROBOTS_FAILED(
                     f"{len(failed)} of {counted(self.analysis.measurements, 'robot')} could not be calibrated "
                     f"({names}); the first: {failed[0][1]}"
@@ -95,7 +95,7 @@ class Fleet(Record):
             )
         wrong = [look for look in self.analysis.looks if any(reason.why == "error" for reason in look.reasons)]
         if wrong:
-            found.append(
+            notices.append(
                 ROBOTS_IN_ERROR(
                     f"The {'result' if len(wrong) == 1 else 'results'} of {counted(len(wrong), 'robot')} "
                     f"({listed([look.robot for look in wrong])}) should not be used: calibrated alone, each ends "
@@ -103,18 +103,18 @@ class Fleet(Record):
                 )
             )
         if self.analysis.usable == 0:
-            found.append(
+            notices.append(
                 NO_RESULT(f"None of {counted(self.analysis.measurements, 'robot')} has a result that can be used.")
             )
         outdated = self._outdated()
         if outdated:
-            found.append(
+            notices.append(
                 ROBOTS_OUTDATED(
                     f"{listed(outdated)} could not be calibrated, and what an earlier run wrote of it stands below "
                     f"{ROBOTS}: remove these folders, or do not use them."
                 )
             )
-        return (*found, *analysis_notices(self.analysis))
+        return (*notices, *analysis_notices(self.analysis))
 
     def _outdated(self) -> list[str]:
         """Return the robots that could not be calibrated and have a folder from before."""
@@ -171,26 +171,26 @@ class Fleet(Record):
 
     def content(self) -> dict[str, Any]:
         """Return what ``fleet.json`` holds, in mm: the same however the parts were computed."""
-        held = held_by(self.blocks())
-        del held["run"]
-        return {"truearm": held["truearm"], **({"simulated": True} if self.simulated_from else {}), **held}
+        summary = json_of(self.blocks())
+        del summary["run"]
+        return {"truearm": summary["truearm"], **({"simulated": True} if self.simulated_from else {}), **summary}
 
     def blocks(self) -> Iterator[Block]:
         """Give how many were calibrated, how, and what the fleet says, in mm and deg."""
-        found, run = self.analysis, self.run
+        analysis, run = self.analysis, self.run
         yield say(
             f"{self._robots()}{self._outcome()}.",
             truearm="truearm-fleet-result/1",
             digest=self.recorded.manifest.digest,
             robots=self.recorded.manifest.count,
-            calibrated=found.measurements - len(found.failed),
-            failed=[{"name": name, "message": message} for name, message in found.failed],
+            calibrated=analysis.measurements - len(analysis.failed),
+            failed=[{"name": name, "message": message} for name, message in analysis.failed],
             missing=[*run.lost],
         )
         before = [f"{counted(run.before, 'part')} of {run.parts} on disk already."] if run.before else []
-        told = (f"{words[0].upper()}{words[1:]}." for words in run.told)
-        yield detail(*before, *told, run={"parts": run.parts, "on_disk_before": run.before, "told": [*run.told]})
-        yield from analysis_blocks(found, None if self.draw is None else f"{self.draw}.")
+        messages = (f"{words[0].upper()}{words[1:]}." for words in run.told)
+        yield detail(*before, *messages, run={"parts": run.parts, "on_disk_before": run.before, "told": [*run.told]})
+        yield from analysis_blocks(analysis, None if self.draw is None else f"{self.draw}.")
         if self.proposed is not None:
             yield say(f"Priors proposed: {counted(len(self.proposed[1]), 'parameter')} in {PRIORS_FILE}.")
 
@@ -277,7 +277,7 @@ class _Line:
         """Take it from what was found."""
         return cls(
             (row.name, row.of or "", row.date or "", row.status, row.fit_status or ""),
-            {kind: found for kind in ACCURACIES if (found := getattr(row, kind)) is not None},
+            {kind: accuracy for kind in ACCURACIES if (accuracy := getattr(row, kind)) is not None},
             " ".join(row.errors),
             row.message,
             row.simulated,

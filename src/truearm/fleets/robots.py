@@ -52,14 +52,14 @@ def calibrated_robot(entry: RobotEntry, folder: Path | None = None) -> Done:
         InputError: If that cannot be written.
     """
     began = time.perf_counter()
-    said = {"date": entry.date, "serial": entry.of}
-    notes = {name: text for name, text in said.items() if text is not None}
-    message, changed, found = None, None, None
+    stated = {"date": entry.date, "serial": entry.of}
+    notes = {name: text for name, text in stated.items() if text is not None}
+    message, changed, result_row = None, None, None
     with noted_reads() as noted:
         try:
-            made = calibrate(entry.robot, entry.data, notes=notes or None, **entry.options)
-            found = _row(entry, made, began)
-            rows_of(to_json(found.content()))
+            calibration = calibrate(entry.robot, entry.data, notes=notes or None, **entry.options)
+            result_row = _row(entry, calibration, began)
+            rows_of(to_json(result_row.content()))
         except InputError as error:
             message = str(error)
         except ValidationError:
@@ -69,15 +69,15 @@ def calibrated_robot(entry: RobotEntry, folder: Path | None = None) -> Done:
     changed = _changed(entry, noted)
     if changed is not None:
         message = f"{changed.name} changed while the fleet ran; start it again"
-    if message is not None or found is None:
+    if message is not None or result_row is None:
         row = Row(entry.name, "failed", message or "", entry.of, entry.date, seconds=time.perf_counter() - began)
         return Done(row, changed=changed is not None)
     written = []
     if folder is not None:  # a folder that cannot be written to is no fault of the robot
         written = [
-            path.relative_to(folder).as_posix() for path in made.save(folder / ROBOTS / entry.name, replace=True)
+            path.relative_to(folder).as_posix() for path in calibration.save(folder / ROBOTS / entry.name, replace=True)
         ]
-    return Done(found, tuple(written))
+    return Done(result_row, tuple(written))
 
 
 def _changed(entry: RobotEntry, noted: Mapping[Path, Sequence[str]]) -> Path | None:
@@ -95,37 +95,37 @@ def _changed(entry: RobotEntry, noted: Mapping[Path, Sequence[str]]) -> Path | N
     return None
 
 
-def _row(entry: RobotEntry, made: Calibration, began: float) -> Row:
-    names, covariance = _own(made)
-    mapping = made.fit.robot.parameters
+def _row(entry: RobotEntry, calibration: Calibration, began: float) -> Row:
+    names, covariance = _own(calibration)
+    mapping = calibration.fit.robot.parameters
     return Row(
         entry.name,
         "calibrated",
         "",
         entry.of,
         entry.date,
-        held_out=_accuracy(made.validation),
-        nominal=_accuracy(made.nominal),
+        held_out=_accuracy(calibration.validation),
+        nominal=_accuracy(calibration.nominal),
         parameters=FoundParameters.of(
             {
                 p.name: FoundParameter(p.unit, p.value, p.deviation or 0.0, p.nominal, p.prior)
                 for p in (mapping[name] for name in names)
             }
         ),
-        fit_status=made.status.value,
-        notices=tuple(notice.code for notice in made.warnings),
+        fit_status=calibration.status.value,
+        notices=tuple(notice.code for notice in calibration.warnings),
         seconds=time.perf_counter() - began,
-        robot=made.fit.robot.name,
-        errors=tuple(notice.code for notice in made.warnings if notice.level == "error"),
+        robot=calibration.fit.robot.name,
+        errors=tuple(notice.code for notice in calibration.warnings if notice.level == "error"),
         drawn=entry.options.get("redundancy", "prior") == "prior",
         covariance=covariance,
-        simulated=bool(made.simulated_from),
+        simulated=bool(calibration.simulated_from),
     )
 
 
-def _own(made: Calibration) -> tuple[list[str], tuple[float, ...]]:
+def _own(calibration: Calibration) -> tuple[list[str], tuple[float, ...]]:
     """Return the parameters of the arm that were identified, and their covariance in priors, row by row."""
-    fit = made.fit
+    fit = calibration.fit
     own = [
         (place, name)
         for place, name in enumerate(fit.free.names)

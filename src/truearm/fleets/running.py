@@ -92,11 +92,11 @@ def _in_the_manifest(error: InputError, place: str) -> InputError:
     def spelled(name: str, value: str | None) -> str:
         return f"'{name}'" if value is None else f"'{name}: {value}'"
 
-    came = error.came
+    value = error.came
     return InputError(
         with_parameters(error.what, spelled),
         where=place,
-        came=Words(with_parameters(came, spelled)) if isinstance(came, str) and "`" in came else came,
+        came=Words(with_parameters(value, spelled)) if isinstance(value, str) and "`" in value else value,
         allowed=None if error.allowed is None else with_parameters(error.allowed, spelled),
         cure=None if error.cure is None else with_parameters(error.cure, spelled),
     )
@@ -164,8 +164,8 @@ def calibrated_fleet(asked: CalibrateFleet) -> Fleet:
             fleet = Fleet(recorded, run, asked.again)
             fleet.write()
     except KeyboardInterrupt as stop:
-        done = len(recorded.on_disk())
-        words = f"{done} of {counted(manifest.parts, 'part')} {'are' if manifest.parts > 1 else 'is'} on disk"
+        on_disk = len(recorded.on_disk())
+        words = f"{on_disk} of {counted(manifest.parts, 'part')} {'are' if manifest.parts > 1 else 'is'} on disk"
         raise KeyboardInterrupt(f"Stopped: {words}; run it again to go on.") from stop
     return fleet
 
@@ -184,38 +184,38 @@ def _tasks(asked: Manifest, folder: Path) -> Callable[[int], Task]:
         robots = asked.robots
         return lambda part: Task(part, __version__, robots=tuple(robots[n] for n in asked.numbers(part)), folder=folder)
     with noted_reads() as noted:
-        made = pickle.dumps(experiment(asked.experiment, f"{asked.file}, experiment"))
+        pickled = pickle.dumps(experiment(asked.experiment, f"{asked.file}, experiment"))
     for name, known in asked.hashes.items():
         if {*noted.get((asked.file.parent / name).absolute(), ())} - {known}:
             raise InputError("this file changed while it was read", where=name, cure="Run this again.")
-    return lambda part: Task(part, __version__, made, tuple(asked.numbers(part)))
+    return lambda part: Task(part, __version__, pickled, tuple(asked.numbers(part)))
 
 
 def _computed(
     recorded: Recorded, known: Known, make: Callable[[int], Task], workers: Workers, progress: Callable[[str], None]
 ) -> Run:
     """Let workers do what is missing, and write each part as it comes."""
-    asked, before = recorded.manifest, len(known.done)
-    tasks = (make(part) for part in range(asked.parts) if part not in known.done)
-    told, lost = [*known.again], list[int]()
-    done, failed, began = before, 0, time.perf_counter()
+    asked, before = recorded.manifest, len(known.finished)
+    tasks = (make(part) for part in range(asked.parts) if part not in known.finished)
+    messages, lost = [*known.again], list[int]()
+    completed, failed, began = before, 0, time.perf_counter()
 
     def tell(words: str) -> None:
-        told.append(words)
+        messages.append(words)
         progress(words)
 
-    progress(f"part {done} of {asked.parts}")
-    for one in done_parts(finished, tasks, workers, tell):
-        done += 1
-        if one.lost:
-            lost.append(one.part.part)
+    progress(f"part {completed} of {asked.parts}")
+    for outcome in done_parts(finished, tasks, workers, tell):
+        completed += 1
+        if outcome.lost:
+            lost.append(outcome.part.part)
             continue
-        failed += _written(recorded, one.part.part, one.result, workers)
-        left = (time.perf_counter() - began) / (done - before) * (asked.parts - done)
+        failed += _written(recorded, outcome.part.part, outcome.result, workers)
+        left = (time.perf_counter() - began) / (completed - before) * (asked.parts - completed)
         words = f", {counted(failed, 'robot')} failed" if failed else ""
-        progress(f"part {done} of {asked.parts}{words}, about {left:.0f} s left")
+        progress(f"part {completed} of {asked.parts}{words}, about {left:.0f} s left")
     names = [name for part in sorted(lost) for name in asked.names(part)]
-    return Run(asked.parts, before, tuple(told), tuple(names))
+    return Run(asked.parts, before, tuple(messages), tuple(names))
 
 
 def _written(recorded: Recorded, part: int, result: object, workers: Workers) -> int:

@@ -143,10 +143,16 @@ class FoundParameters(Mapping[str, FoundParameter]):
         columns = {kind: tuple(column) for kind, column in {**shared, **content}.items()}
         if len({*map(len, columns.values())}) > 1:
             raise ValueError("columns of different lengths")
-        made = cls(**columns)
-        if not len(made.name) == len({*made.name}) == len(made.unit) == len(made.prior) == len(made.value):
+        parameters = cls(**columns)
+        if (
+            not len(parameters.name)
+            == len({*parameters.name})
+            == len(parameters.unit)
+            == len(parameters.prior)
+            == len(parameters.value)
+        ):
             raise ValueError("columns are missing, or names are there twice")
-        return made
+        return parameters
 
 
 @dataclass(frozen=True)
@@ -351,8 +357,8 @@ def calibrated(problem: Problem, readings: Array) -> tuple[Array, Array, NDArray
     going = np.arange(len(x))
     for number in range(_STEPS):
         # All begin at the nominal values: one Jacobian serves the first step of them all.
-        here = problem.at(x[going] if number else nominal[None])
-        r, J = here.residual - readings[going], here.jacobian
+        prediction = problem.at(x[going] if number else nominal[None])
+        r, J = prediction.residual - readings[going], prediction.jacobian
         Jt = np.swapaxes(J, 1, 2)
         information[going] = (Jt @ J) * np.outer(prior, prior) + np.eye(len(prior))
         gradient = (Jt @ r[:, :, None])[:, :, 0] * prior + (x[going] - nominal) / prior
@@ -377,11 +383,11 @@ def _position_errors(problem: Problem, truth: Array, estimate: Array, q: Array, 
     apart = np.empty((len(truth), len(q)))
     size = max(1, _BLOCK // len(q))
     for block in (slice(first, first + size) for first in range(0, len(truth), size)):
-        true, found = (
+        true, estimated = (
             robot.forward_kinematics(q, target, {**robot.values, **free.values(vectors[block])}).position
             for vectors in (truth, estimate)
         )
-        apart[block] = np.linalg.norm(found - true, axis=0)
+        apart[block] = np.linalg.norm(estimated - true, axis=0)
     return apart
 
 
@@ -421,21 +427,21 @@ class Experiment:
 class Series:
     """Robots of an experiment, calibrated by the part; what all of them share is made once."""
 
-    def __init__(self, made: Experiment) -> None:
-        self.made = made
-        model = named_model(made.asked.model)
-        robot = model.prepared(made.robot)
-        self.problem = of_itself(robot, made.joints, model, made.asked.noise)
+    def __init__(self, experiment: Experiment) -> None:
+        self.experiment = experiment
+        model = named_model(experiment.asked.model)
+        robot = model.prepared(experiment.robot)
+        self.problem = of_itself(robot, experiment.joints, model, experiment.asked.noise)
         self.frames = Problem(robot, self.problem.data, FRAMES.free(robot), {})
         self.drawn = np.array([p.group not in PLACES for p in self.problem.free.parameters])
 
     @cached_property
-    def _kept(self) -> tuple[list[int], FoundParameters]:
+    def _of_arm(self) -> tuple[list[int], FoundParameters]:
         """The places of the arm's parameters among those identified, and what is the same of every robot's."""
         free = self.problem.free.parameters
-        kept = np.flatnonzero(self.drawn).tolist()
-        those = [free[k] for k in kept]
-        return kept, FoundParameters(
+        columns = np.flatnonzero(self.drawn).tolist()
+        those = [free[k] for k in columns]
+        return columns, FoundParameters(
             tuple(p.name for p in those),
             tuple(p.unit for p in those),
             tuple(p.nominal for p in those),
@@ -445,7 +451,7 @@ class Series:
     @property
     def shared(self) -> dict[str, Any]:
         """What is the same of every robot's parameters, column by column."""
-        return self._kept[1].shared
+        return self._of_arm[1].shared
 
     def rows(self, numbers: Sequence[int]) -> list[Row]:
         """Return what is found of some robots, counted from 0."""
@@ -454,21 +460,21 @@ class Series:
 
     def _rows(self, numbers: Sequence[int]) -> list[Row]:
         began = time.perf_counter()
-        made, free = self.made, self.problem.free
-        judged = (len(made.robot.targets), 3, len(made.held_out))
+        experiment, free = self.experiment, self.problem.free
+        judged = (len(experiment.robot.targets), 3, len(experiment.held_out))
         truth = np.tile(free.nominal, (len(numbers), 1))
         readings = np.empty((len(numbers), self.problem.rows))
         noise = np.empty((len(numbers), *judged))
         prior = free.prior
         for i, number in enumerate(numbers):
-            rng = np.random.default_rng(np.random.SeedSequence(made.asked.seed, spawn_key=(1, number)))
+            rng = np.random.default_rng(np.random.SeedSequence(experiment.asked.seed, spawn_key=(1, number)))
             truth[i, self.drawn] += (prior * rng.standard_normal(len(prior)))[self.drawn]
             readings[i] = rng.standard_normal(self.problem.rows)
-            noise[i] = made.asked.noise * rng.standard_normal(judged)
+            noise[i] = experiment.asked.noise * rng.standard_normal(judged)
         readings += self.problem.at(truth).residual
-        found, deviation, settled = calibrated(self.problem, readings)
+        estimates, deviation, settled = calibrated(self.problem, readings)
         placed, _, _ = calibrated(self.frames, readings)
-        true, calibrated_there = (self._positions(self.problem, vectors) for vectors in (truth, found))
+        true, calibrated_there = (self._positions(self.problem, vectors) for vectors in (truth, estimates))
         nominal_there = self._positions(self.frames, placed)
         errors = {
             "held_out": calibrated_there - true - noise,
@@ -480,20 +486,20 @@ class Series:
             for name, apart in errors.items()
         }
         seconds = (time.perf_counter() - began) / len(numbers)
-        kept, shared = self._kept
+        columns, shared = self._of_arm
         rows = []
         for i, number in enumerate(numbers):
-            name = made.asked.name(number)
+            name = experiment.asked.name(number)
             if not settled[i]:
                 rows.append(
-                    Row(name, "failed", "the calibration did not settle", seconds=seconds, robot=made.robot.name)
+                    Row(name, "failed", "the calibration did not settle", seconds=seconds, robot=experiment.robot.name)
                 )
                 continue
             parameters = replace(
                 shared,
-                value=tuple(found[i, kept].tolist()),
-                deviation=tuple(deviation[i, kept].tolist()),
-                truth=tuple(truth[i, kept].tolist()),
+                value=tuple(estimates[i, columns].tolist()),
+                deviation=tuple(deviation[i, columns].tolist()),
+                truth=tuple(truth[i, columns].tolist()),
             )
             rows.append(
                 Row(
@@ -505,7 +511,7 @@ class Series:
                     parameters=parameters,
                     fit_status="converged",
                     seconds=seconds,
-                    robot=made.robot.name,
+                    robot=experiment.robot.name,
                 )
             )
         return rows
@@ -513,6 +519,6 @@ class Series:
     def _positions(self, problem: Problem, vectors: Array) -> Array:
         """Return where targets are at the configurations that judge, ``(robots, targets, 3, configurations)`` [m]."""
         values = {**problem.robot.values, **problem.free.values(vectors)}
-        names = [target.name for target in self.made.robot.targets]
-        at = [problem.robot.forward_kinematics(self.made.held_out, name, values).position for name in names]
+        names = [target.name for target in self.experiment.robot.targets]
+        at = [problem.robot.forward_kinematics(self.experiment.held_out, name, values).position for name in names]
         return np.stack([np.broadcast_to(np.moveaxis(p, 0, 1), (len(vectors), 3, p.shape[-1])) for p in at], axis=1)

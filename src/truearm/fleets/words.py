@@ -13,7 +13,7 @@ from truearm.fleets.analysis import (
     LEAST_SPREAD,
     Analysis,
     Difference,
-    KindFound,
+    KindAnalysis,
     Look,
     ParameterSpread,
     Reason,
@@ -29,7 +29,7 @@ ERRORS_OF: Final = {
     "truth": "Calibrated robots, without the instrument's noise",
 }
 #: Robots, parameters and changes that are told line by line.
-_TOLD: Final = 8
+_MOST_LINES: Final = 8
 #: Robots to look at that JSON holds.
 _MOST_LOOKS: Final = 1000
 
@@ -56,192 +56,199 @@ def sized(value: float, unit: str, *, sign: bool = False) -> str:
     return f"{number:{'+' if sign else ''}.3g} {shown}"
 
 
-def quantile_words(one: Quantile, robots: int) -> str:
+def quantile_words(quantile: Quantile, robots: int) -> str:
     """Return an error below which a share of the robots is."""
-    share = f"{one.share * 100:g} %"
-    if one.value is None:
+    share = f"{quantile.share * 100:g} %"
+    if quantile.value is None:
         return f"{share} below: not known from {counted(robots, 'robot')}"
-    return f"{share} below {one.value * 1e3:.3f} mm ({interval_words(one)})"
+    return f"{share} below {quantile.value * 1e3:.3f} mm ({interval_words(quantile)})"
 
 
-def interval_words(one: Quantile) -> str:
+def interval_words(quantile: Quantile) -> str:
     """Return the interval of such an error, as far as it is known."""
-    low, high = (None if end is None else f"{end * 1e3:.3f}" for end in (one.low, one.high))
+    low, high = (None if end is None else f"{end * 1e3:.3f}" for end in (quantile.low, quantile.high))
     if low is None and high is None:
-        return f"its interval takes {one.needed} robots"
+        return f"its interval takes {quantile.needed} robots"
     if high is None:
         return f"95 %: above {low}"
     return f"95 %: below {high}" if low is None else f"95 %: {low} to {high}"
 
 
-def _accuracy(found: Analysis) -> Iterator[Block]:
+def _accuracy(analysis: Analysis) -> Iterator[Block]:
     """Give the errors over the series [mm], and how many have none."""
-    yield under("errors_mm", (under(name, [_errors(found, name)]) for name in found.errors))
-    if found.left_out:
-        out = f"{counted(len(found.left_out), 'robot')} ({listed(found.left_out)})"
+    yield under("errors_mm", (under(name, [_errors(analysis, name)]) for name in analysis.errors))
+    if analysis.left_out:
+        out = f"{counted(len(analysis.left_out), 'robot')} ({listed(analysis.left_out)})"
         yield detail(f"Left out of all figures, because their results end with an error: {out}.")
-    if found.failed:
-        low, high = (100.0 * end for end in found.failing)
+    if analysis.failed:
+        low, high = (100.0 * end for end in analysis.failing)
         yield detail(
-            f"Not calibrated: {len(found.failed)} of {found.measurements}; of such a series {low:.3g} to {high:.3g} % "
-            "(95 %)."
+            f"Not calibrated: {len(analysis.failed)} of {analysis.measurements}; of such a series {low:.3g} to "
+            f"{high:.3g} % (95 %)."
         )
 
 
-def _errors(found: Analysis, name: str) -> Words:
-    errors = found.errors[name]
+def _errors(analysis: Analysis, name: str) -> Words:
+    errors = analysis.errors[name]
     count = len(errors.mean)
-    told = [quantile_words(one, count) for one in errors.of_means if one.value is not None]
+    shares = [quantile_words(quantile, count) for quantile in errors.of_means if quantile.value is not None]
     worst = f"the worst {errors.mean.max() * 1e3:.3f} mm"
-    of = "" if count == found.machines else f" of {counted(count, 'robot')}"
+    of = "" if count == analysis.machines else f" of {counted(count, 'robot')}"
     return say(
-        f"{ERRORS_OF[name]}, mean error{of}: {', '.join([*told, worst])}.",
+        f"{ERRORS_OF[name]}, mean error{of}: {', '.join([*shares, worst])}.",
         robots=count,
-        of_means=[_quantile(one) for one in errors.of_means],
-        of_largest=[_quantile(one) for one in errors.of_largest],
+        of_means=[_quantile(quantile) for quantile in errors.of_means],
+        of_largest=[_quantile(quantile) for quantile in errors.of_largest],
         worst_mean=float(errors.mean.max()) * 1e3,
         worst_largest=float(errors.largest.max()) * 1e3,
     )
 
 
-def _quantile(one: Quantile) -> dict[str, Any]:
-    value, low, high = (None if end is None else end * 1e3 for end in (one.value, one.low, one.high))
-    return {"share": one.share, "value": value, "low_95": low, "high_95": high, "robots_needed": one.needed}
+def _quantile(quantile: Quantile) -> dict[str, Any]:
+    value, low, high = (None if end is None else end * 1e3 for end in (quantile.value, quantile.low, quantile.high))
+    return {"share": quantile.share, "value": value, "low_95": low, "high_95": high, "robots_needed": quantile.needed}
 
 
-def _kind(found: KindFound, *, several: bool) -> Iterator[Block]:
+def _kind(analysis: KindAnalysis, *, several: bool) -> Iterator[Block]:
     """Give what robots of one kind say of their parameters; in text their drift stands with that of the others."""
-    count = len(found.kind.latest)
-    name = f"{found.kind.robot}: " if several else ""
+    count = len(analysis.kind.latest)
+    name = f"{analysis.kind.robot}: " if several else ""
     beside = (
         "with one another" if count >= LEAST_COMPARED else f"with their priors (fewer than {LEAST_COMPARED} robots)"
     )
-    differing = list(dict.fromkeys(difference.robot for difference in found.differences))
-    said = "none differs"
+    differing = list(dict.fromkeys(difference.robot for difference in analysis.differences))
+    outcome = "none differs"
     if differing:
-        said = f"{listed(differing)} {'differs' if len(differing) == 1 else 'differ'}"
+        outcome = f"{listed(differing)} {'differs' if len(differing) == 1 else 'differ'}"
     yield say(
-        f"{name}Parameters of {counted(count, 'robot')} compared {beside}: {said}.",
-        robot=found.kind.robot,
+        f"{name}Parameters of {counted(count, 'robot')} compared {beside}: {outcome}.",
+        robot=analysis.kind.robot,
         robots=count,
-        differing=[_difference(difference) for difference in found.differences[:_MOST_LOOKS]],
-        drift=[_drift(one) for one in found.drifts.found[:_MOST_LOOKS]],
-        drift_not_seen=[*found.drifts.unknown],
+        differing=[_difference(difference) for difference in analysis.differences[:_MOST_LOOKS]],
+        drift=[_drift(drift) for drift in analysis.drifts.changes[:_MOST_LOOKS]],
+        drift_not_seen=[*analysis.drifts.unknown],
     )
     text = []
     for verdict, words in _VERDICTS.items():
-        those = [spread for spread in found.spreads if spread.verdict == verdict]
+        those = [spread for spread in analysis.spreads if spread.verdict == verdict]
         known = verdict in ("wider", "narrower")
         if those:
-            told = listed([f"{one.parameter} {spread_words(one)}" if known else one.parameter for one in those])
-            text.append(f"  {words}: {told}.")
-    shifted = [mean_words(spread) for spread in found.spreads if spread.beside]
+            names = listed(
+                [f"{spread.parameter} {spread_words(spread)}" if known else spread.parameter for spread in those]
+            )
+            text.append(f"  {words}: {names}.")
+    shifted = [mean_words(spread) for spread in analysis.spreads if spread.beside]
     if shifted:
         text.append(f"  The whole series lies beside nominal: {listed(shifted)}.")
-    yield detail(*text, parameters=[_spread(spread) for spread in found.spreads])
+    yield detail(*text, parameters=[_spread(spread) for spread in analysis.spreads])
 
 
-def _difference(one: Difference) -> dict[str, Any]:
-    off, unit = in_unit(one.off, one.unit)
+def _difference(difference: Difference) -> dict[str, Any]:
+    off, unit = in_unit(difference.off, difference.unit)
     return {
-        "robot": one.robot,
-        "parameter": one.parameter,
-        "together_with": [*one.together],
+        "robot": difference.robot,
+        "parameter": difference.parameter,
+        "together_with": [*difference.together],
         "unit": unit,
         "off": off,
-        "deviations": one.times,
-        "chance": one.chance,
-        "beside": one.beside,
+        "deviations": difference.times,
+        "chance": difference.chance,
+        "beside": difference.beside,
     }
 
 
-def _drift(one: Drift) -> dict[str, Any]:
-    slope, unit = in_unit(one.slope, one.unit)
+def _drift(drift: Drift) -> dict[str, Any]:
+    slope, unit = in_unit(drift.slope, drift.unit)
     return {
-        "machine": one.machine,
-        "parameter": one.parameter,
-        "together_with": [*one.together],
-        "campaigns": one.campaigns,
-        "months": one.months,
+        "machine": drift.machine,
+        "parameter": drift.parameter,
+        "together_with": [*drift.together],
+        "campaigns": drift.campaigns,
+        "months": drift.months,
         "unit": unit,
         "a_month": slope,
-        "low_95": in_unit(one.low, one.unit)[0],
-        "high_95": in_unit(one.high, one.unit)[0],
-        "chance": one.chance,
-        "significant": one.significant,
-        "steady": one.steady,
+        "low_95": in_unit(drift.low, drift.unit)[0],
+        "high_95": in_unit(drift.high, drift.unit)[0],
+        "chance": drift.chance,
+        "significant": drift.significant,
+        "steady": drift.steady,
     }
 
 
-def _spread(one: ParameterSpread) -> dict[str, Any]:
+def _spread(spread: ParameterSpread) -> dict[str, Any]:
     def shown(value: float | None) -> float | None:
-        return None if value is None or value != value else in_unit(value, one.unit)[0]
+        return None if value is None or value != value else in_unit(value, spread.unit)[0]
 
     return {
-        "name": one.parameter,
-        "unit": SHOWN_AS[one.unit],
-        "informed": None if one.share != one.share else one.share,
-        "robots": one.robots,
-        "prior": shown(one.prior),
-        "verdict": one.verdict,
-        "mean_off_nominal": shown(one.mean),
-        "mean_95": None if one.mean is None else [shown(one.mean_low), shown(one.mean_high)],
-        "series_beside_nominal": one.beside,
-        "spread": shown(one.spread),
-        "spread_95": None if one.spread is None else [shown(one.low), shown(one.high)],
-        "proposed_prior": shown(one.proposed),
+        "name": spread.parameter,
+        "unit": SHOWN_AS[spread.unit],
+        "informed": None if spread.share != spread.share else spread.share,
+        "robots": spread.robots,
+        "prior": shown(spread.prior),
+        "verdict": spread.verdict,
+        "mean_off_nominal": shown(spread.mean),
+        "mean_95": None if spread.mean is None else [shown(spread.mean_low), shown(spread.mean_high)],
+        "series_beside_nominal": spread.beside,
+        "spread": shown(spread.spread),
+        "spread_95": None if spread.spread is None else [shown(spread.low), shown(spread.high)],
+        "proposed_prior": shown(spread.proposed),
     }
 
 
-def mean_words(one: ParameterSpread) -> str:
+def mean_words(spread: ParameterSpread) -> str:
     """Return how far the mean of a series is from nominal."""
-    if one.mean is None or one.mean_low is None or one.mean_high is None:
-        return one.parameter
-    low, high = (f"{in_unit(end, one.unit)[0]:.3g}" for end in (one.mean_low, one.mean_high))
-    return f"{one.parameter} {sized(one.mean, one.unit, sign=True)} ({low} to {high})"
+    if spread.mean is None or spread.mean_low is None or spread.mean_high is None:
+        return spread.parameter
+    low, high = (f"{in_unit(end, spread.unit)[0]:.3g}" for end in (spread.mean_low, spread.mean_high))
+    return f"{spread.parameter} {sized(spread.mean, spread.unit, sign=True)} ({low} to {high})"
 
 
-def spread_words(one: ParameterSpread) -> str:
+def spread_words(spread: ParameterSpread) -> str:
     """Return how far a parameter scatters, beside its prior."""
-    if one.spread is None or one.low is None or one.high is None:
+    if spread.spread is None or spread.low is None or spread.high is None:
         return ""
-    low, high = (f"{in_unit(end, one.unit)[0]:.3g}" for end in (one.low, one.high))
-    return f"{sized(one.spread, one.unit)} ({low} to {high}; prior {sized(one.prior, one.unit)})"
+    low, high = (f"{in_unit(end, spread.unit)[0]:.3g}" for end in (spread.low, spread.high))
+    return f"{sized(spread.spread, spread.unit)} ({low} to {high}; prior {sized(spread.prior, spread.unit)})"
 
 
-def together_words(one: Difference | Drift) -> str:
+def together_words(change: Difference | Drift) -> str:
     """Return the name of a parameter, with those it is told together with."""
-    if one.alone:
-        return one.parameter
-    return f"{one.parameter} (with {listed(one.together)})" if one.together else f"{one.parameter} (not alone)"
-
-
-def difference_words(one: Difference) -> str:
-    """Return how a parameter of a robot differs."""
-    of = "the median" if one.beside == "series" else "nominal"
-    return f"{together_words(one)} {sized(one.off, one.unit, sign=True)} off {of} ({abs(one.times):.1f} deviations)"
-
-
-def drift_words(one: Drift) -> str:
-    """Return how fast a parameter of a machine changes."""
-    low, high = (f"{in_unit(end, one.unit)[0]:.3g}" for end in (one.low, one.high))
-    bent = ", not steadily" if one.steady is False else ""
+    if change.alone:
+        return change.parameter
     return (
-        f"{together_words(one)} {sized(one.slope, one.unit, sign=True)} a month (95 %: {low} to {high}{bent}) over "
-        f"{one.months:.1f} months"
+        f"{change.parameter} (with {listed(change.together)})" if change.together else f"{change.parameter} (not alone)"
     )
 
 
-def _changes(found: Analysis) -> Iterator[Words]:
+def difference_words(difference: Difference) -> str:
+    """Return how a parameter of a robot differs."""
+    of = "the median" if difference.beside == "series" else "nominal"
+    return (
+        f"{together_words(difference)} {sized(difference.off, difference.unit, sign=True)} off {of} "
+        f"({abs(difference.times):.1f} deviations)"
+    )
+
+
+def drift_words(drift: Drift) -> str:
+    """Return how fast a parameter of a machine changes."""
+    low, high = (f"{in_unit(end, drift.unit)[0]:.3g}" for end in (drift.low, drift.high))
+    unsteady = ", not steadily" if drift.steady is False else ""
+    return (
+        f"{together_words(drift)} {sized(drift.slope, drift.unit, sign=True)} a month (95 %: {low} to {high}{unsteady})"
+        f" over {drift.months:.1f} months"
+    )
+
+
+def _changes(analysis: Analysis) -> Iterator[Words]:
     """Give what has changed of machines that were measured again; JSON holds it with their kind."""
-    machines = {drift.machine for drift in found.drifts}
+    machines = {drift.machine for drift in analysis.drifts}
     if machines:
-        changed = [drift for drift in found.drifts if drift.significant]
-        those = {one.machine for one in changed}
+        changed = [drift for drift in analysis.drifts if drift.significant]
+        those = {drift.machine for drift in changed}
         words = f"{counted(len(those), 'machine')} changed" if those else "none has changed by more than chance"
         yield say(f"Measured again: {counted(len(machines), 'machine')}; {words}.")
-        yield detail(*(f"  {one.machine}: {drift_words(one)}" for one in changed))
-    for alike in (one for kind in found.kinds for one in kind.drifts.alike):
+        yield detail(*(f"  {drift.machine}: {drift_words(drift)}" for drift in changed))
+    for alike in (change for kind in analysis.kinds for change in kind.drifts.alike):
         yield detail(f"  all machines alike: {alike.parameter} {sized(alike.slope, alike.unit, sign=True)} a month")
 
 
@@ -269,34 +276,34 @@ def reason_words(reason: Reason) -> str:
 
 def _looks(looks: Sequence[Look]) -> Words:
     """Return the robots to look at first; text tells fewer of them."""
-    held, text = list[dict[str, Any]](), ["Look first at:"]
+    entries, text = list[dict[str, Any]](), ["Look first at:"]
     for look in looks[:_MOST_LOOKS]:
         words = [reason_words(reason) for reason in look.reasons]
-        held.append({"robot": look.robot, "why": [reason.why for reason in look.reasons], "words": words})
+        entries.append({"robot": look.robot, "why": [reason.why for reason in look.reasons], "words": words})
         text.append(f"  {look.robot}: {'; '.join(words)}")
-    return say(*(text if looks else []), look_first=held)
+    return say(*(text if looks else []), look_first=entries)
 
 
-def outcome_words(found: Analysis) -> str:
+def outcome_words(analysis: Analysis) -> str:
     """Return of how many the result can be used, of how many not, and how many have none."""
-    wrong = len(found.left_out)
-    return f"{found.usable} usable, {wrong} whose result ends with an error, {len(found.failed)} not calibrated"
+    wrong = len(analysis.left_out)
+    return f"{analysis.usable} usable, {wrong} whose result ends with an error, {len(analysis.failed)} not calibrated"
 
 
-def analysis_blocks(found: Analysis, draw: str | None = None) -> Iterator[Block]:
+def analysis_blocks(analysis: Analysis, draw: str | None = None) -> Iterator[Block]:
     """Give all that a fleet says, in mm and deg; `draw` is what its figures hold for."""
     yield say(
-        measurements=found.measurements,
-        machines=found.machines,
-        left_out=[*found.left_out],
-        failing_95=[*found.failing] if found.measurements else None,
+        measurements=analysis.measurements,
+        machines=analysis.machines,
+        left_out=[*analysis.left_out],
+        failing_95=[*analysis.failing] if analysis.measurements else None,
     )
-    yield from _accuracy(found)
-    if draw is not None and found.errors:
+    yield from _accuracy(analysis)
+    if draw is not None and analysis.errors:
         yield say(draw)
-    yield _looks(found.looks)
-    yield from _changes(found)
-    yield each("kinds", (_kind(kind, several=len(found.kinds) > 1) for kind in found.kinds))
+    yield _looks(analysis.looks)
+    yield from _changes(analysis)
+    yield each("kinds", (_kind(kind, several=len(analysis.kinds) > 1) for kind in analysis.kinds))
 
 
 ROBOTS_DIFFER: Final = Rule(
@@ -328,10 +335,10 @@ DRIFT_UNDATED: Final = Rule(
 )
 
 
-def analysis_notices(found: Analysis) -> list[Notice]:
+def analysis_notices(analysis: Analysis) -> list[Notice]:
     """Return what to know about the figures of a fleet."""
     notices = []
-    differing = {difference.robot for kind in found.kinds for difference in kind.differences}
+    differing = {difference.robot for kind in analysis.kinds for difference in kind.differences}
     if differing:
         notices.append(
             ROBOTS_DIFFER(
@@ -339,7 +346,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
                 f"({listed(sorted(differing))})."
             )
         )
-    changed = list(dict.fromkeys(drift.machine for drift in found.drifts if drift.significant))
+    changed = list(dict.fromkeys(drift.machine for drift in analysis.drifts if drift.significant))
     if changed:
         notices.append(
             ROBOTS_DRIFT(
@@ -348,7 +355,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
                 "looks the same."
             )
         )
-    alike = [one.parameter for kind in found.kinds for one in kind.drifts.alike]
+    alike = [change.parameter for kind in analysis.kinds for change in kind.drifts.alike]
     if alike:
         notices.append(
             DRIFT_ALIKE(
@@ -356,7 +363,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
                 "likely changed than all of them."
             )
         )
-    others = [name for kind in found.kinds for name in kind.drifts.others]
+    others = [name for kind in analysis.kinds for name in kind.drifts.others]
     if others:
         notices.append(
             ANOTHER_MACHINE(
@@ -364,7 +371,7 @@ def analysis_notices(found: Analysis) -> list[Notice]:
                 "differ from one another."
             )
         )
-    undated = [name for kind in found.kinds for name in kind.drifts.undated]
+    undated = [name for kind in analysis.kinds for name in kind.drifts.undated]
     if undated:
         notices.append(
             DRIFT_UNDATED(

@@ -54,7 +54,10 @@ class _Fixtures(Given):
 
     def typed_again(self, value: Any) -> list[str]:
         """Return each place as a text."""
-        at = [(Numbers("", "mm").typed_again(one.translation), Numbers().typed_again(one.quaternion)) for one in value]
+        at = [
+            (Numbers("", "mm").typed_again(place.translation), Numbers().typed_again(place.quaternion))
+            for place in value
+        ]
         return [",".join([*place, *turn]) for place, turn in at]
 
 

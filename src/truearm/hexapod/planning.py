@@ -71,8 +71,8 @@ def places_argument(fixture: object) -> tuple[Transform, ...]:
     return (_fixture_argument(fixture),)
 
 
-def _is_place(one: object) -> bool:
-    return isinstance(one, Transform | np.ndarray | list | tuple)
+def _is_place(value: object) -> bool:
+    return isinstance(value, Transform | np.ndarray | list | tuple)
 
 
 def _fixture_argument(fixture: object) -> Transform:

@@ -140,21 +140,21 @@ def reachable(
     base = robot.base
     inside = (np.moveaxis(part, 1, -1) @ base.rotation.T + np.array(base.translation) for part in (starts, ends))
     starts, ends = (np.moveaxis(part, -1, 1) for part in inside)
-    room = clearance(robot, joint_solutions.joints, starts, ends, arm_radius)
+    gaps = clearance(robot, joint_solutions.joints, starts, ends, arm_radius)
     meant = np.array([not branches or branch.startswith(tuple(branches)) for branch in joint_solutions.branch])
-    kept = usable & ~wide & meant & (room > 0)
+    measurable = usable & ~wide & meant & (gaps > 0)
     reasons = np.select(
         [~(usable | beyond), ~(usable & ~wide), ~meant], [OUT_OF_REACH, BEYOND_LIMITS, NOT_WANTED], TOO_NEAR
     )
-    left_out = Counter(reasons[~kept].tolist())
-    if not kept.any():
+    left_out = Counter(reasons[~measurable].tolist())
+    if not measurable.any():
         raise InputError(
             f"{robot.name} can reach none of the {len(on_sides)} poses with the fixture at this place",
             parameter="fixture" if arm_radius == ARM_RADIUS else "fixture, arm_radius",
             came=", ".join(f"{count} {reason}" for reason, count in left_out.items()),
             cure="Move the fixture; it is given in the robot's base frame.",
         )
-    rows = np.flatnonzero(kept)
+    rows = np.flatnonzero(measurable)
     order = rows[all_moving_order(joint_solutions.joints[rows], 0.0)]
     planned = tuple(
         PlannedRow(
@@ -168,7 +168,7 @@ def reachable(
         )
         for number, row in enumerate(order.tolist(), 1)
     )
-    return Reachable(planned, room[order], dict(left_out), len(on_sides))
+    return Reachable(planned, gaps[order], dict(left_out), len(on_sides))
 
 
 def reachable_at_places(
@@ -190,20 +190,20 @@ def reachable_at_places(
     Raises:
         InputError: As :func:`reachable`, if nothing is left at one of the places.
     """
-    found = []
+    parts = []
     for number, fixture in enumerate(fixtures, 1):
         with refusals_at(f"fixture_{number}") if len(fixtures) > 1 else nullcontext():
-            found.append(
+            parts.append(
                 reachable(robot, fixture, wanted, arm_radius=arm_radius, branches=branches, fourth_cup=fourth_cup)
             )
-    if len(found) == 1:
-        return found[0]
-    rows = [replace(row, place=f"fixture_{number}") for number, part in enumerate(found, 1) for row in part.rows]
+    if len(parts) == 1:
+        return parts[0]
+    rows = [replace(row, place=f"fixture_{number}") for number, part in enumerate(parts, 1) for row in part.rows]
     return Reachable(
         tuple(replace(row, configuration=str(number)) for number, row in enumerate(rows, 1)),
-        np.concatenate([part.clearance for part in found]),
-        dict(sum((Counter(part.left_out) for part in found), Counter())),
-        sum(part.poses for part in found),
+        np.concatenate([part.clearance for part in parts]),
+        dict(sum((Counter(part.left_out) for part in parts), Counter())),
+        sum(part.poses for part in parts),
     )
 
 
@@ -220,8 +220,8 @@ def attached_anew(plan: Reachable, attachments: int) -> Reachable:
     for attachment in range(2, attachments + 1):
         rows += [replace(rows[number], attachment=str(attachment)) for number in chosen]
     numbered = tuple(replace(row, configuration=str(number)) for number, row in enumerate(rows, 1))
-    room = np.concatenate([plan.clearance, np.tile(plan.clearance[chosen], attachments - 1)])
-    return replace(plan, rows=numbered, clearance=room)
+    gaps = np.concatenate([plan.clearance, np.tile(plan.clearance[chosen], attachments - 1)])
+    return replace(plan, rows=numbered, clearance=gaps)
 
 
 def _in_frame(outer: Transform, inner: Transform) -> Transform:
@@ -283,20 +283,20 @@ def steps_text(plan: Reachable, robot: Robot, controller: Controller | None = No
     joints = np.array([row.joints for row in plan.rows])
     shown = joints if controller is None else controller.from_model(joints)
     called = "joints" if controller is None else "joints as the controller shows them"
-    there, attached = "", plan.rows[0].attachment
-    for row, at, room in zip(plan.rows, shown.tolist(), plan.clearance.tolist(), strict=True):
+    previous_place, attached = "", plan.rows[0].attachment
+    for row, at, gap in zip(plan.rows, shown.tolist(), plan.clearance.tolist(), strict=True):
         positions = " ".join(
             f"{from_si(value, 'deg' if joint.kind == 'revolute' else 'mm'):.3f}"
             for joint, value in zip(robot.joints, at, strict=True)
         )
-        if row.place != there:
+        if row.place != previous_place:
             lines += [f"Place {row.place}: set the base fixture up there; steps 2 and 3.", ""]
-            there = row.place
+            previous_place = row.place
         if row.attachment != attached:
             lines += [f"Attachment {row.attachment}: take the tool off, and attach it again.", ""]
             attached = row.attachment
         pose = f"pose {row.pose} on side {row.side}" if with_sides else f"pose {row.pose}"
-        lines.append(f"Configuration {row.configuration}  ({pose}, {row.branch}, {room * 1e3:.0f} mm of room)")
+        lines.append(f"Configuration {row.configuration}  ({pose}, {row.branch}, {gap * 1e3:.0f} mm of room)")
         lines.append(f"   {called} {positions}")
         lines += [f"   [ ] Attach the bar between {' and '.join(name.split('-'))}." for name in row.leg_names]
     return "\n".join(lines) + "\n"

@@ -166,7 +166,7 @@ def measure_poses(
             range.
     """
     directions = np.zeros(joints.shape) if approach is None else approach
-    found = np.full((len(rows), 3, 3), np.nan)
+    cups = np.full((len(rows), 3, 3), np.nan)
     for number, (row, q, direction) in enumerate(zip(rows, joints, directions, strict=True)):
         if initialise:
             bar.initialise()
@@ -174,8 +174,8 @@ def measure_poses(
         legs = measured_legs(bar, row.design, fixtures.base_cups, _cups(attached, q, direction))
         if len(legs) == len(row.design.legs):
             lengths = np.array([legs[name] for name in row.design.leg_names])
-            found[number] = tool_cups(row.design, row.solution, fixtures.base, fixtures.tool, lengths)
-    return found
+            cups[number] = tool_cups(row.design, row.solution, fixtures.base, fixtures.tool, lengths)
+    return cups
 
 
 def cups_dataset(robot: Robot, labels: Sequence[str], joints: Array, cups: Array) -> Dataset:
@@ -202,20 +202,20 @@ def joined(a: Dataset, b: Dataset) -> Dataset:
         InputError: If their targets or joints are others, or only one of them declares deviations or the like, or one
             holds more than positions.
     """
-    where = f"{a.source} and {b.source}"
+    place = f"{a.source} and {b.source}"
     if (a.targets, a.joint_kinds) != (b.targets, b.joint_kinds):
-        raise InputError("the sessions are not of one robot with one tool", where=where, cure="Name the cups alike.")
+        raise InputError("the sessions are not of one robot with one tool", where=place, cure="Name the cups alike.")
     for name in ("quaternion", "sigma_rot", "visit", "references"):
         if getattr(a, name) is not None or getattr(b, name) is not None:
-            raise InputError(f"sessions with {name} cannot be joined", where=where, allowed="positions")
+            raise InputError(f"sessions with {name} cannot be joined", where=place, allowed="positions")
 
     def part(name: str) -> Array | None:
-        one, other = getattr(a, name), getattr(b, name)
-        if (one is None) != (other is None):
+        first, second = getattr(a, name), getattr(b, name)
+        if (first is None) != (second is None):
             raise InputError(
-                f"only one of the sessions has {name}", where=where, cure="Leave it out of both, or give it in both."
+                f"only one of the sessions has {name}", where=place, cure="Leave it out of both, or give it in both."
             )
-        return None if one is None else np.concatenate([one, other])
+        return None if first is None else np.concatenate([first, second])
 
     return replace(
         a,

@@ -60,8 +60,8 @@ class HexapodUncertainty(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give both for each solution."""
-        printed = [float(np.linalg.norm(found.third_as_printed)) for found in self.solutions]
-        norms = [found.norms for found in self.solutions]
+        printed = [float(np.linalg.norm(solution.third_as_printed)) for solution in self.solutions]
+        norms = [solution.norms for solution in self.solutions]
         yield say(
             "solution     t1     t2     t3   t3 as printed   Monte Carlo: t1     t2     t3   [sigma]",
             *(
@@ -133,7 +133,7 @@ class HexapodSolution(Record):
     @property
     def notices(self) -> tuple[Notice, ...]:
         """What to know about it."""
-        if self.attached is None or self.attached.found is not None:
+        if self.attached is None or self.attached.repeatability is not None:
             return ()
         return (
             ATTACHMENTS_NOT_COMPARED(
@@ -149,7 +149,7 @@ class HexapodSolution(Record):
         yield each("poses", (pose.block(among=self.poses) for pose in self.poses))
         missing = [f"Left out, not all legs measured: {', '.join(self.left_out)}"] if self.left_out else []
         yield say(*missing, left_out=list(self.left_out))
-        repeats = None if self.attached is None else self.attached.found
+        repeats = None if self.attached is None else self.attached.repeatability
         yield say(tool_changer=None) if repeats is None else under("tool_changer", [_changer(repeats)])
         yield say(*notice_lines(self.notices), notices=notice_summaries(self.notices))
 
@@ -164,22 +164,25 @@ class HexapodSolution(Record):
         write_text(output_file(file, self.inputs), csv_text(self.data))
 
 
-def _changer(found: ChangerRepeatability) -> Words:
+def _changer(repeatability: ChangerRepeatability) -> Words:
     """Return how well the tool changer repeats the cups, in mm."""
-    deviation, mean, largest = ((values * 1e3).tolist() for values in (found.changer, found.mean, found.largest))
-    robot = None if found.rest is None else (found.rest * 1e3).tolist()
+    deviation, mean, largest = (
+        (values * 1e3).tolist() for values in (repeatability.changer, repeatability.mean, repeatability.largest)
+    )
+    robot = None if repeatability.rest is None else (repeatability.rest * 1e3).tolist()
     ballbar = CUP_DEVIATION * DEVICE.sigma * 1e3
-    rest = "the robot's repeatability contained"
+    remark = "the robot's repeatability contained"
     if robot is not None:
-        rest = f"robot and ballbar without it {_lengths(robot)} mm"
+        remark = f"robot and ballbar without it {_lengths(robot)} mm"
     return say(
-        f"Tool changer, from {counted(found.pairs, 'pair')} of readings with {found.compared} attachments:",
-        f"  it repeats a coordinate of T1, T2, T3 to {_lengths(deviation)} mm ({rest})",
+        f"Tool changer, from {counted(repeatability.pairs, 'pair')} of readings with {repeatability.compared} "
+        "attachments:",
+        f"  it repeats a coordinate of T1, T2, T3 to {_lengths(deviation)} mm ({remark})",
         f"  a cup is moved by {_lengths(mean)} mm on average, by {_lengths(largest)} mm at most",
         f"  the ballbar alone would know it to {ballbar:.4f} mm: taking the tool off costs "
         f"{max(deviation) / ballbar:.0f} times as much. The data declare it.",
-        attachments=found.compared,
-        pairs=found.pairs,
+        attachments=repeatability.compared,
+        pairs=repeatability.pairs,
         deviation_mm=deviation,
         rest_mm=robot,
         mean_mm=mean,
@@ -204,17 +207,17 @@ class HexapodPlan(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give how many configurations there are, at which places, and what was left out, in mm."""
-        found, room = self.reachable, float(self.reachable.clearance.min()) * 1e3
+        plan, gap = self.reachable, float(self.reachable.clearance.min()) * 1e3
         yield say(
-            f"{found.poses_reached} of {found.poses} poses, {len(found.rows)} configurations",
-            poses=found.poses,
-            poses_reached=found.poses_reached,
-            configurations=len(found.rows),
+            f"{plan.poses_reached} of {plan.poses} poses, {len(plan.rows)} configurations",
+            poses=plan.poses,
+            poses_reached=plan.poses_reached,
+            configurations=len(plan.rows),
         )
         yield each("places", self._places())
-        left_out = ", ".join(f"{n} {why}" for why, n in found.left_out.items())
-        yield say(f"Left out: {left_out or 'nothing'}", left_out=dict(found.left_out))
-        yield say(f"Smallest room between arm and bars: {room:.0f} mm", smallest_room_mm=room)
+        left_out = ", ".join(f"{n} {why}" for why, n in plan.left_out.items())
+        yield say(f"Left out: {left_out or 'nothing'}", left_out=dict(plan.left_out))
+        yield say(f"Smallest room between arm and bars: {gap:.0f} mm", smallest_room_mm=gap)
         yield say(*joints_lines(self.joints_are), joints_are=self.joints_are)
         if self.files:
             yield say(f"Written to {', '.join(map(str, self.files))}")
@@ -229,8 +232,8 @@ class HexapodPlan(Record):
             line = f"{place or 'The fixture'}: {counted(counts.total(), 'configuration')}"
             if several:
                 line += f" ({', '.join(f'{n} on side {side}' for side, n in sorted(counts.items()))})"
-            told = [line] if several or len(sides) > 1 else []
-            yield say(*told, place=place or None, sides=dict(sorted(counts.items())))
+            lines = [line] if several or len(sides) > 1 else []
+            yield say(*lines, place=place or None, sides=dict(sorted(counts.items())))
 
     def sheet_text(self) -> str:
         """Return the sheet to fill in, as CSV."""

@@ -75,7 +75,9 @@ class Attachments:
     """The attachments of the tool in a sheet, two or more."""
 
     count: int  #: How many there were.
-    found: ChangerRepeatability | None  #: How well they repeat; None if no configuration was measured with two of them.
+    repeatability: (
+        ChangerRepeatability | None
+    )  #: How well they repeat; None if no configuration was measured with two of them.
 
 
 def compared(cups: Array, joints: Array, places: Sequence[str], attachments: Sequence[str]) -> Attachments:
@@ -102,14 +104,14 @@ def compared(cups: Array, joints: Array, places: Sequence[str], attachments: Seq
     names = [attachments[row] for rows in again for row in rows]
     known = sorted(set(names))
     of_configuration = np.repeat(np.eye(len(again)), [len(rows) for rows in again], axis=0)
-    of_attachment = np.array([[name == one for one in known] for name in names], float)
+    of_attachment = np.array([[name == attachment for attachment in known] for name in names], float)
     both = np.hstack([of_configuration, of_attachment])
     apart = of_attachment - of_configuration @ np.linalg.lstsq(of_configuration, of_attachment, rcond=None)[0]
     without, left = _left(of_configuration, moved), _left(both, moved)
     freedom = int(np.linalg.matrix_rank(both)) - len(again)
     free = len(moved) - len(again) - freedom
-    rest = left / free if free else np.zeros(3)
-    changer = np.sqrt(np.maximum(without - left - freedom * rest, 0.0) / (apart**2).sum())
+    unexplained = left / free if free else np.zeros(3)
+    changer = np.sqrt(np.maximum(without - left - freedom * unexplained, 0.0) / (apart**2).sum())
     distances = np.array(
         [
             np.linalg.norm(cups[a] - cups[b], axis=1)
@@ -122,7 +124,7 @@ def compared(cups: Array, joints: Array, places: Sequence[str], attachments: Seq
         count,
         ChangerRepeatability(
             changer=changer,
-            rest=np.sqrt(rest) if free else None,
+            rest=np.sqrt(unexplained) if free else None,
             mean=distances.mean(axis=0),
             largest=distances.max(axis=0),
             pairs=len(distances),
@@ -134,8 +136,8 @@ def compared(cups: Array, joints: Array, places: Sequence[str], attachments: Seq
 def _left(columns: Array, moved: Array) -> Array:
     """Return the variance of a coordinate of each cup times its degrees of freedom that columns leave, ``(3,)``."""
     flat = moved.reshape(len(moved), -1)
-    rest = flat - columns @ np.linalg.lstsq(columns, flat, rcond=None)[0]
-    return np.asarray((rest.reshape(moved.shape) ** 2).sum(axis=(0, 2)) / 3.0)
+    residual = flat - columns @ np.linalg.lstsq(columns, flat, rcond=None)[0]
+    return np.asarray((residual.reshape(moved.shape) ** 2).sum(axis=(0, 2)) / 3.0)
 
 
 # A fourth cup on the base fixture, 300 mm from the three others (Nubiola, 4.5).
@@ -236,7 +238,7 @@ class Sheet:
 
         That is the frame of its first three cups, whatever the side. NaN where a leg is missing.
         """
-        found = np.full((len(self.labels), 3, 3), np.nan)
+        cups = np.full((len(self.labels), 3, 3), np.nan)
         for row in self.measured.tolist():
             side, base = self.sides[row], self.base[row]
             if side > 1:
@@ -245,8 +247,8 @@ class Sheet:
             if side > 1:
                 frame = side_frames(four_cups(self.base[row], self.to_fourth[row]))[side - 1]
                 seen = seen @ frame.rotation.T + np.array(frame.translation)
-            found[row] = seen
-        return found
+            cups[row] = seen
+        return cups
 
     def attached(self) -> Attachments | None:
         """Return how well the tool changer repeats the cups; None if the tool was attached once, as far as is said."""
@@ -283,9 +285,9 @@ class Sheet:
         several = self.places is not None and len(fixtures) > 1
         attached = self.attached()
         sigma = None
-        if attached is not None and attached.found is not None and self.attachments is not None:
-            found = attached.found.declared([self.attachments[row] for row in rows])
-            sigma = np.maximum(found, CUP_DEVIATION * DEVICE.sigma).reshape(-1)
+        if attached is not None and attached.repeatability is not None and self.attachments is not None:
+            deviations = attached.repeatability.declared([self.attachments[row] for row in rows])
+            sigma = np.maximum(deviations, CUP_DEVIATION * DEVICE.sigma).reshape(-1)
         return Dataset(
             source=self.source,
             labels=tuple(self.labels[row] for row in rows),
@@ -350,9 +352,9 @@ def sheet_csv(
     for number, row in enumerate(rows):
         known = lengths[number] if lengths else {}
         cells = (repr(written(known[name], "mm")) if name in known else "" for name in names)
-        said = {"configuration": row.configuration, "place": row.place, "pose": row.pose, "branch": row.branch}
-        said |= {"side": row.side, "design": row.design.name, "solution": row.solution, "attachment": row.attachment}
-        writer.writerow([*(said[name] for name in plain), *positions[number], *cells])
+        texts = {"configuration": row.configuration, "place": row.place, "pose": row.pose, "branch": row.branch}
+        texts |= {"side": row.side, "design": row.design.name, "solution": row.solution, "attachment": row.attachment}
+        writer.writerow([*(texts[name] for name in plain), *positions[number], *cells])
     return stream.getvalue()
 
 
@@ -407,40 +409,43 @@ def together(sheets: Sequence[Sheet]) -> Sheet:
     return joined
 
 
-def _refuse_others(one: Sheet, other: Sheet) -> None:
-    where = f"{one.source} and {other.source}"
-    if one.configurations is not None and other.configurations is not None:
-        kinds = [sheet.configurations.kinds for sheet in (one, other) if sheet.configurations is not None]
+def _refuse_others(first: Sheet, second: Sheet) -> None:
+    place = f"{first.source} and {second.source}"
+    if first.configurations is not None and second.configurations is not None:
+        kinds = [sheet.configurations.kinds for sheet in (first, second) if sheet.configurations is not None]
         if kinds[0] != kinds[1]:
             raise InputError(
                 "the sheets are not of one robot",
-                where=where,
+                where=place,
                 came=f"joints {', '.join(kinds[0])}, and {', '.join(kinds[1])}",
                 cure="Solve the sheets of each robot on their own.",
             )
-        if one.configurations.joints_are != other.configurations.joints_are:
+        if first.configurations.joints_are != second.configurations.joints_are:
             raise InputError(
                 "one of the sheets has joint_1 .., the other axis_1 ..",
-                where=where,
+                where=place,
                 cure="Plan both alike: joint positions of the model, or those that the controller shows.",
             )
-    elif one.configurations is not other.configurations:
-        raise InputError("only one of the sheets has joint positions", where=where, cure="Add them.")
-    for name, mine, its in zip(side_names("T"), one.tool[-1], other.tool[0], strict=True):
-        if abs(mine - its) > _SAME_FIXTURE:
+    elif first.configurations is not second.configurations:
+        raise InputError("only one of the sheets has joint positions", where=place, cure="Add them.")
+    for name, length, other_length in zip(side_names("T"), first.tool[-1], second.tool[0], strict=True):
+        if abs(length - other_length) > _SAME_FIXTURE:
             raise InputError(
                 "the sheets are not of one tool",
-                where=where,
-                came=f"{name} {mine * 1e3:.4f} and {its * 1e3:.4f} mm",
+                where=place,
+                came=f"{name} {length * 1e3:.4f} and {other_length * 1e3:.4f} mm",
                 allowed=f"distances between its cups that differ by {_SAME_FIXTURE * 1e3:g} mm at most",
                 cure="Solve the sheets of each tool on their own. If the tool is the same, measure its cups again.",
             )
-    for what, values in (("places", (one.places, other.places)), ("attachments", (one.attachments, other.attachments))):
+    for kind, values in (
+        ("places", (first.places, second.places)),
+        ("attachments", (first.attachments, second.attachments)),
+    ):
         if (values[0] is None) != (values[1] is None):
             raise InputError(
-                f"only one of the sheets names its {what}",
-                where=where,
-                allowed=f"a column {what[:-1]} that is filled in in all sheets, or in none",
+                f"only one of the sheets names its {kind}",
+                where=place,
+                allowed=f"a column {kind[:-1]} that is filled in in all sheets, or in none",
                 cure="Fill it in in all of them, the same name for the same.",
             )
 
@@ -470,12 +475,12 @@ def _refuse_moved(sheet: Sheet, place: str) -> None:
         )
     between = np.hstack([sheet.base[rows], sheet.to_fourth[rows]])
     for name, lengths in zip((*side_names("B"), *TO_FOURTH), between.T, strict=True):
-        given = lengths[np.isfinite(lengths)]
-        if len(given) and np.ptp(given) > _SAME_FIXTURE:
+        known_lengths = lengths[np.isfinite(lengths)]
+        if len(known_lengths) and np.ptp(known_lengths) > _SAME_FIXTURE:
             raise InputError(
                 f"the base fixture did not stand still at the place {place}",
                 where=sheet.source,
-                came=f"{name} from {given.min() * 1e3:.4f} to {given.max() * 1e3:.4f} mm",
+                came=f"{name} from {known_lengths.min() * 1e3:.4f} to {known_lengths.max() * 1e3:.4f} mm",
                 allowed=f"distances that differ by {_SAME_FIXTURE * 1e3:g} mm at most",
                 cure="A fixture that was set up anew stands at another place: give it another name.",
             )

@@ -16,7 +16,7 @@ from truearm.engine.base.units import COLUMN as SIMULATED
 from truearm.engine.data.hexapod import DEVICE, SOLUTIONS, Design, Device, designs
 from truearm.engine.data.readers.canonical import refuse_other_separators
 from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cells
-from truearm.engine.data.readers.rows import found_configurations
+from truearm.engine.data.readers.rows import row_configurations
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.urdf_writing import COLUMN, JOINT_COLUMN, joint_names
@@ -52,7 +52,7 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
             cure="One row each. If it was measured again, give it another name.",
         )
     by_name = {design.name: design for design in designs()}
-    found = [_one_of(cells, row, columns["design"][0], by_name) for row in range(len(labels))]
+    row_designs = [_one_of(cells, row, columns["design"][0], by_name) for row in range(len(labels))]
     solutions = {str(number): number for number in SOLUTIONS}
     chosen = [_one_of(cells, row, columns["solution"][0], solutions) for row in range(len(labels))]
     sides = [1] * len(labels)
@@ -65,10 +65,10 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
         return cells.numbers(*columns[name], missing=True) if name in columns else np.full(len(labels), np.nan)
 
     legs = {name: lengths(name) for name in (*LEGS, *FOURTH_LEGS)}
-    where = places or labels[:1] * len(labels)
-    first = np.array([where.index(place) for place in where])  # the first row of each row's place
+    place_of_row = places or labels[:1] * len(labels)
+    first = np.array([place_of_row.index(place) for place in place_of_row])  # the first row of each row's place
     fixtures = {
-        name: _held(cells, columns[name], lengths(name), first if name.startswith("B") else np.zeros_like(first))
+        name: _filled_down(cells, columns[name], lengths(name), first if name.startswith("B") else np.zeros_like(first))
         for name in FIXTURES
     }
     fixtures |= {name: _last_given(lengths(name), first) for name in TO_FOURTH}
@@ -76,8 +76,8 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
         nominal = device.leg if name in legs else device.base if name.startswith("B") else device.tool
         for row in np.flatnonzero(np.isfinite(values)).tolist():
             device.check(nominal, float(values[row]), name, cells.place(row, columns[name][0]))
-    named = [legs_of_side(design, side) for design, side in zip(found, sides, strict=True)]
-    _refuse_strange_legs(cells, columns, found, named, legs)
+    named = [legs_of_side(design, side) for design, side in zip(row_designs, sides, strict=True)]
+    _refuse_strange_legs(cells, columns, row_designs, named, legs)
     read = np.array([[legs[name][row] for name in names] for row, names in enumerate(named)])
     measured = np.isfinite(read).all(axis=1)
     to_fourth = np.column_stack([fixtures[name] for name in TO_FOURTH])
@@ -86,12 +86,12 @@ def read_sheet(path: Path, device: Device = DEVICE) -> Sheet:
     if any(JOINT_COLUMN.fullmatch(name) for name in columns):
         joints_are, joints = joint_names(columns, f"{path}, line {header}")
         at, units = zip(*(columns[name] for name in joints), strict=True)
-        configurations = found_configurations(cells, labels, at, units, joints_are)
+        configurations = row_configurations(cells, labels, at, units, joints_are)
     return Sheet(
         source=str(path),
         configurations=configurations,
         labels=labels,
-        designs=tuple(found),
+        designs=tuple(row_designs),
         solutions=tuple(chosen),
         base=np.column_stack([fixtures[name] for name in FIXTURES[:3]]),
         tool=np.column_stack([fixtures[name] for name in FIXTURES[3:]]),
@@ -140,7 +140,7 @@ def _last_given(values: Array, first: Array) -> Array:
     return np.where(last >= first, values[np.maximum(last, 0)], np.nan)
 
 
-def _held(cells: Cells, column: tuple[int, str], values: Array, first: Array) -> Array:
+def _filled_down(cells: Cells, column: tuple[int, str], values: Array, first: Array) -> Array:
     """Return such a column in which the first row of each place has a value."""
     missing = np.flatnonzero(~np.isfinite(values[first]))
     if len(missing):
@@ -159,9 +159,13 @@ def _held(cells: Cells, column: tuple[int, str], values: Array, first: Array) ->
 
 
 def _refuse_strange_legs(
-    cells: Cells, columns: Columns, found: Sequence[Design], named: Sequence[tuple[str, ...]], legs: dict[str, Array]
+    cells: Cells,
+    columns: Columns,
+    row_designs: Sequence[Design],
+    named: Sequence[tuple[str, ...]],
+    legs: dict[str, Array],
 ) -> None:
-    for row, (design, names) in enumerate(zip(found, named, strict=True)):
+    for row, (design, names) in enumerate(zip(row_designs, named, strict=True)):
         for name, values in legs.items():
             if np.isfinite(values[row]) and name not in names:
                 raise InputError(
@@ -182,7 +186,7 @@ def _refuse_unknown_sides(
                 raise InputError(
                     f"side {sides[row]} was measured, and the distance {name} is not known",
                     where=cells.place(row, columns["side"][0]),
-                    allowed=f"{', '.join(f'{one} [mm]' for one in TO_FOURTH)} in line {cells.lines[int(first[row])]}",
+                    allowed=f"{', '.join(f'{side} [mm]' for side in TO_FOURTH)} in line {cells.lines[int(first[row])]}",
                     cure="Measure the distances to the fourth cup: they say where the sides are to each other.",
                 )
 
@@ -191,9 +195,9 @@ def _attachments(cells: Cells, columns: Columns, measured: Array) -> tuple[str, 
     if "attachment" not in columns:
         return None
     column = columns["attachment"][0]
-    found = cells.texts(column, missing=True)
-    missing = [row for row in np.flatnonzero(measured).tolist() if not found[row]]
-    if not any(found):
+    names = cells.texts(column, missing=True)
+    missing = [row for row in np.flatnonzero(measured).tolist() if not names[row]]
+    if not any(names):
         return None
     if missing:
         raise InputError(
@@ -203,29 +207,29 @@ def _attachments(cells: Cells, columns: Columns, measured: Array) -> tuple[str, 
             cure="Number the attachments in all rows that were measured. If the tool was never taken off, leave the "
             "whole column empty.",
         )
-    return found
+    return names
 
 
 def _columns(cells: Cells) -> Columns:
     """Return place and unit of every column by its name, or refuse the header."""
     columns: Columns = {}
     for place, heading in enumerate(cells.names):
-        where = f"{cells.source}, line {cells.header}, column {place + 1}"
+        location = f"{cells.source}, line {cells.header}, column {place + 1}"
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
         if name in columns:
-            raise InputError(f"the column {name} appears twice", where=where, cure="Remove one of them.")
+            raise InputError(f"the column {name} appears twice", where=location, cure="Remove one of them.")
         if name in _PLAIN:
             columns[name] = (place, "1")
         elif name in _LENGTHS:
-            columns[name] = (place, checked_unit(unit, LENGTH_UNITS, f"{where}, {heading}"))
+            columns[name] = (place, checked_unit(unit, LENGTH_UNITS, f"{location}, {heading}"))
         elif JOINT_COLUMN.fullmatch(name):
-            columns[name] = (place, checked_unit(unit, (*ANGLE_UNITS, *LENGTH_UNITS), f"{where}, {heading}"))
+            columns[name] = (place, checked_unit(unit, (*ANGLE_UNITS, *LENGTH_UNITS), f"{location}, {heading}"))
         else:
             near = nearest_names(name, (*_PLAIN, *_LENGTHS), 1)
             raise InputError(
                 "the column is not known",
-                where=where,
+                where=location,
                 came=heading,
                 allowed=f"{', '.join(_PLAIN)}, joint_1 [deg] .. or axis_1 [deg] .., and lengths such as B1-T1 [mm]",
                 cure=f"Did you mean {near[0]}?" if near else "Rename it, or leave it out.",
@@ -262,18 +266,18 @@ def read_touches(path: Path, robot: Robot) -> Array:
     known = ("cup", *(f"{kind}_{number}" for kind in COLUMN.values() for number in numbers))
     columns: dict[str, tuple[int, str]] = {}
     for place, heading in enumerate(cells.names):
-        where = f"{path}, line {header}, column {place + 1}"
+        location = f"{path}, line {header}, column {place + 1}"
         match = _HEADING_TOUCHES.fullmatch(heading)
         if match is None or match["name"] not in known or match["name"] in columns:
             raise InputError(
-                "the column is not known, or appears twice", where=where, came=heading, allowed=", ".join(known)
+                "the column is not known, or appears twice", where=location, came=heading, allowed=", ".join(known)
             )
         if match["name"] == "cup":
             columns["cup"] = (place, "1")
         else:
             kind = robot.joints[int(match["name"].rpartition("_")[2]) - 1].kind
             units = ANGLE_UNITS if kind == "revolute" else LENGTH_UNITS
-            columns[match["name"]] = (place, checked_unit(match["unit"], units, f"{where}, {heading}"))
+            columns[match["name"]] = (place, checked_unit(match["unit"], units, f"{location}, {heading}"))
     joints_are, _ = joint_names(columns, f"{path}, line {header}")
     wanted = ("cup", *(f"{COLUMN[joints_are]}_{number}" for number in numbers))
     missing = [name for name in wanted if name not in columns]
@@ -285,8 +289,8 @@ def read_touches(path: Path, robot: Robot) -> Array:
             "every base cup is touched once", where=str(path), came=", ".join(labels), allowed=", ".join(_CUPS)
         )
     joints = np.column_stack([cells.numbers(*columns[name]) for name in wanted[1:]])
-    found = np.asarray(joints[[labels.index(cup) for cup in _CUPS]])
+    touched = np.asarray(joints[[labels.index(cup) for cup in _CUPS]])
     if joints_are == "model":
-        return found
+        return touched
     robot.controller.check_counts(robot.name, f"{path}, column axis_1")
-    return robot.controller.to_model(found)
+    return robot.controller.to_model(touched)

@@ -58,12 +58,12 @@ def solved(asked: SolveCups) -> HexapodSolution:
     device = replace(DEVICE, reach=asked.reach)
     if asked.legs is not None:
         return HexapodSolution((_one_pose(asked, device),), (), None)
-    given = _sheets_argument(asked.sheet)
-    inputs = files_of(*given)
+    sheets = _sheets_argument(asked.sheet)
+    inputs = files_of(*sheets)
     path = None if asked.out is None else file_for(asked.out, *inputs)
     with refusals_of("sheet"):
         whole = together(
-            [one if isinstance(one, Sheet) else read_sheet(path_argument(one, "sheet"), device) for one in given]
+            [item if isinstance(item, Sheet) else read_sheet(path_argument(item, "sheet"), device) for item in sheets]
         )
     hexapod_solution = _of_sheet(whole, inputs, with_data=path is not None)
     if path is not None:
@@ -96,7 +96,7 @@ def _sheets_argument(sheet: object) -> tuple[object, ...]:
         return (sheet,)
     if not sheet:
         raise InputError("there is no sheet", parameter="sheet", allowed="one or more")
-    files = [one.absolute() for one in files_of(*sheet)]
+    files = [file.absolute() for file in files_of(*sheet)]
     twice = [file for number, file in enumerate(files) if any(same_place(file, other) for other in files[:number])]
     if twice:
         raise InputError("the sheet is given twice", parameter="sheet", came=str(twice[0]), cure="Give it once.")

@@ -117,16 +117,16 @@ def _matrix(path: Path, width: int | None, unit: str, *, missing: bool) -> Array
         cells = split_line(text.partition("#")[0])
         if not cells:
             continue
-        where = f"{path}, line {line}"
-        refuse_beyond("columns", len(cells), where=where)
-        refuse_beyond("cells", (len(rows) + 1) * len(cells), where=where)
-        row = [_number(cell, unit, f"{where}, column {c}", missing=missing) for c, cell in enumerate(cells, 1)]
+        place = f"{path}, line {line}"
+        refuse_beyond("columns", len(cells), where=place)
+        refuse_beyond("cells", (len(rows) + 1) * len(cells), where=place)
+        row = [_number(cell, unit, f"{place}, column {c}", missing=missing) for c, cell in enumerate(cells, 1)]
         first = first or line
         wanted = width or (len(rows[0]) if rows else len(row))
         if len(row) != wanted:
             raise InputError(
                 "a position has three numbers" if width else f"the row is not as long as line {first}",
-                where=where,
+                where=place,
                 came=counted(len(row), "number"),
                 allowed=counted(wanted, "number"),
                 cure="Write one configuration a row.",
@@ -139,13 +139,13 @@ def _matrix(path: Path, width: int | None, unit: str, *, missing: bool) -> Array
     return np.array(rows)
 
 
-def _number(cell: str, unit: str, where: str, *, missing: bool) -> float:
+def _number(cell: str, unit: str, place: str, *, missing: bool) -> float:
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else None
     except ValueError:
         value = None
     if value is not None and math.isfinite(value):
-        return sized_si(value, unit, where, came=cell)
+        return sized_si(value, unit, place, came=cell)
     if value is not None and missing and math.isnan(value):
         return value
     allowed = "a finite number, or NaN for a missing reading" if missing else "a finite number"
@@ -157,7 +157,7 @@ def _number(cell: str, unit: str, where: str, *, missing: bool) -> float:
         cure = "Write a row of zeros or NaN where there is no reading."
     else:
         cure = "Every configuration needs all joints: remove the row from all files."
-    raise InputError("a number belongs here", where=where, came=cell, allowed=allowed, cure=cure)
+    raise InputError("a number belongs here", where=place, came=cell, allowed=allowed, cure=cure)
 
 
 def of_matrices(asked: ImportMatrices) -> Imported:

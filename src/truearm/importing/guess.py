@@ -128,23 +128,23 @@ def guess_mapping(path: Path) -> Guessed:
     if unused:
         shown = ", ".join(escaped(name) for name in unused[:20])
         text.lines.append(f"# Not used: {shown}")
-    made = Guessed("\n".join(text.lines) + "\n", tuple(text.guesses))
-    return made if made.open or not joints else _tried(made, path)
+    guessed = Guessed("\n".join(text.lines) + "\n", tuple(text.guesses))
+    return guessed if guessed.open or not joints else _tried(guessed, path)
 
 
 def _no_numbers(columns: Sequence[Column], lines: Sequence[int]) -> list[str]:
     """Return where columns of numbers hold something else for the first time."""
-    found = []
+    messages = []
     for column in columns:
-        if len(column.values) + sum(text in column.nothing for text in column.given) == len(column.given):
+        if len(column.values) + sum(text in column.nothing for text in column.filled) == len(column.filled):
             continue
         row, text = next(
             (row, text)
             for row, text in enumerate(column.texts)
             if text and text not in column.nothing and number_of(text, column.decimal) is None
         )
-        found.append(f"line {lines[row]}, column {column.name}: {text[:40]!r} is no number as others are written")
-    return found
+        messages.append(f"line {lines[row]}, column {column.name}: {text[:40]!r} is no number as others are written")
+    return messages
 
 
 def _refuse_other_numbers(path: Path, positions: Mapping[tuple[str, ...], Sequence[Column]]) -> None:
@@ -154,7 +154,7 @@ def _refuse_other_numbers(path: Path, positions: Mapping[tuple[str, ...], Sequen
         raise InputError(
             f"the column {column.name} is called like a coordinate, and holds no numbers that can be read",
             where=str(path),
-            came=next(iter(column.given), None),
+            came=next(iter(column.filled), None),
             allowed="numbers with one decimal sign and no thousands separators",
             cure="Export the table again without thousands separators.",
         )
@@ -174,12 +174,12 @@ def _refuse_canonical(path: Path, layout: GuessedLayout) -> None:
 def _refuse_cut_names(path: Path, columns: Sequence[Column]) -> None:
     """Refuse names with blanks in a table between whose columns are blanks."""
     for first, second in pairwise(columns):
-        for one, other in zip(first.texts, second.texts, strict=True):
-            if "::" in one and ("::" in other or all(text.isdigit() for text in second.texts)):
+        for text, other in zip(first.texts, second.texts, strict=True):
+            if "::" in text and ("::" in other or all(text.isdigit() for text in second.texts)):
                 raise InputError(
                     "a name with blanks seems to stand in a table whose columns are separated by blanks",
                     where=str(path),
-                    came=f"{one} {other}",
+                    came=f"{text} {other}",
                     cure="Export the table again with commas, semicolons or tabs between its columns.",
                 )
 
@@ -294,13 +294,13 @@ def _write_labels(
         if several:
             continue
         _write_orientation(text, quaternion, sure, angles)
-        for name, found, unit in (
+        for name, columns_of_sigma, unit in (
             ("sigma", sigma, unit_of(sigma) or length_unit(every)[0]),
             ("sigma_rot", sigma_rot, unit_of(sigma_rot) or angle_unit(angles[0] if angles else ())[0]),
         ):
-            if found:
-                coverage = ", coverage: 2" if is_expanded(found) else ""
-                value = f"{{columns: {list_of(found)}, unit: {quoted(unit)}{coverage}}}"
+            if columns_of_sigma:
+                coverage = ", coverage: 2" if is_expanded(columns_of_sigma) else ""
+                value = f"{{columns: {list_of(columns_of_sigma)}, unit: {quoted(unit)}{coverage}}}"
                 because = "their names; standard deviations, or expanded uncertainties by a coverage of 2"
                 text.add(f"readings.{name}", value, because, f"    {name}: {value}")
     if several and (quaternion or angles or sigma):
@@ -365,14 +365,14 @@ def _names(left: _Left, several: bool) -> tuple[Column | None, Column | None, st
         if parts in ({1}, {2}) and all(re.fullmatch(pattern, text) for text in column.texts):
             left.take([column])
             return column, None, pattern
-    whole = [column for column in left.columns if column.given and len(column.given) == len(column.texts)]
+    whole = [column for column in left.columns if column.filled and len(column.filled) == len(column.texts)]
     texts = [column for column in whole if column.can_name]
     target = None if several else named_like(texts, "target")
     left.take([target] if target else [])
-    rest = [column for column in texts if column is not target]
-    words = [column for column in rest if not column.is_numeric]
-    label = named_like(words, "label") or named_like(rest, "label") or next(iter(words), None)
-    label = label or next((column for column in rest if column.counts), None)
+    other_texts = [column for column in texts if column is not target]
+    words = [column for column in other_texts if not column.is_numeric]
+    label = named_like(words, "label") or named_like(other_texts, "label") or next(iter(words), None)
+    label = label or next((column for column in other_texts if column.counts), None)
     left.take([label] if label else [])
     if label is not None and target is None and not several and label.distinct < len(label.texts):
         others = [column for column in words if column is not label]
@@ -386,7 +386,7 @@ def _names(left: _Left, several: bool) -> tuple[Column | None, Column | None, st
 def _visit(left: _Left, label: Column, target: Column | None) -> Column | None:
     """Return the column that tells apart rows of one label and one target, if one is called like that."""
     named_so = named_like([column for column in left.columns if column.is_numeric and column.can_name], "visit")
-    if named_so is None or len(named_so.given) < len(named_so.texts):
+    if named_so is None or len(named_so.filled) < len(named_so.texts):
         return None
     reading = list(zip(label.texts, label.texts if target is None else target.texts, strict=True))
     if label.distinct == len(label.texts) or named_so.distinct < 2:
@@ -429,14 +429,14 @@ def _write_order(text: MappingText, label: Column | None, time: GuessedTime | No
             text.add("order", "{by: labels}", "the labels are numbered; remove it if they were not measured so")
 
 
-def _tried(made: Guessed, path: Path) -> Guessed:
+def _tried(guessed: Guessed, path: Path) -> Guessed:
     """Try an import with a guessed mapping, in memory."""
-    content = validated(YAML(typ="safe", pure=True).load(made.text), MappingFile, "the guessed mapping")
+    content = validated(YAML(typ="safe", pure=True).load(guessed.text), MappingFile, "the guessed mapping")
     try:
         data = read_with(TableFiles(path, Path("the guessed mapping"), content, None))[0]
     except InputError as error:
-        return replace(made, refusal=str(error))
-    return replace(made, configurations=data.configurations, targets=data.targets)
+        return replace(guessed, refusal=str(error))
+    return replace(guessed, configurations=data.configurations, targets=data.targets)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -458,25 +458,25 @@ class GuessedMapping(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give what was guessed, and what is to be done."""
-        made, where = self.guessed, "" if self.out is None else f": {self.out}"
+        guessed, destination = self.guessed, "" if self.out is None else f": {self.out}"
         yield say(
-            f"Guessed {counted(len(self.guesses), 'entry').replace('entrys', 'entries')}{where}",
+            f"Guessed {counted(len(self.guesses), 'entry').replace('entrys', 'entries')}{destination}",
             guesses=[{"entry": g.entry, "value": g.value, "because": g.because} for g in self.guesses],
         )
         words = "No columns are called like joint positions: name them, or the file that holds them."
-        if made.open:
-            words = f"Nothing in the file tells {listed(made.open)}: answer each '?'."
-        elif made.refusal is not None:
-            words = f"An import with it would be refused: {made.refusal}"
-        elif made.configurations:
-            many = counted(made.configurations, "configuration")
-            words = f"An import with it would read {many}, targets {listed(made.targets)}."
+        if guessed.open:
+            words = f"Nothing in the file tells {listed(guessed.open)}: answer each '?'."
+        elif guessed.refusal is not None:
+            words = f"An import with it would be refused: {guessed.refusal}"
+        elif guessed.configurations:
+            many = counted(guessed.configurations, "configuration")
+            words = f"An import with it would read {many}, targets {listed(guessed.targets)}."
         yield say(
             words,
-            open=list(made.open),
-            refusal=made.refusal,
-            configurations=made.configurations,
-            targets=list(made.targets),
+            open=list(guessed.open),
+            refusal=guessed.refusal,
+            configurations=guessed.configurations,
+            targets=list(guessed.targets),
         )
         yield say("Nothing is imported before every guess is confirmed: look at each, then write confirmed: yes.")
 

@@ -32,7 +32,7 @@ class _Apart(Given):
 
     def typed_again(self, value: Any) -> list[str]:
         """Return it in mm."""
-        return [",".join(f"{text}mm" for one in value for text in Number("mm").typed_again(one))]
+        return [",".join(f"{text}mm" for number in value for text in Number("mm").typed_again(number))]
 
 
 class _Diameter(Given):
@@ -46,8 +46,8 @@ class _Diameter(Given):
         is_text = isinstance(value, str)
         diameter = quantity_si(value, _LENGTHS, name, "25", "25mm") if is_text else length_argument(value, name)
         if diameter <= 0.0:
-            came = f"{1e3 * diameter:g} mm"
-            raise InputError("the ball has no size", parameter=name, came=came, allowed="above 0 mm")
+            size = f"{1e3 * diameter:g} mm"
+            raise InputError("the ball has no size", parameter=name, came=size, allowed="above 0 mm")
         return diameter
 
     def typed_again(self, value: Any) -> list[str]:

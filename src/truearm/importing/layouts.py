@@ -113,11 +113,11 @@ def guess_layout(path: Path) -> GuessedLayout:
         entries["comment"] = (comment, "lines begin with it")
     behind = _lines_behind(text, lines)
     some = islice(behind, max(_MOST_LINES - len(lines), 0))
-    made = _with_header(replace(best, rows=[*best.rows, *_cut(some, comment, best.delimiter)]), entries, path)
+    layout = _with_header(replace(best, rows=[*best.rows, *_cut(some, comment, best.delimiter)]), entries, path)
     if next(behind, None) is None:
-        return made
+        return layout
     seen = f"only the first {_MOST_LINES} lines were looked at; an import refuses by its cell what does not fit below"
-    return replace(made, notes=(*made.notes, seen))
+    return replace(layout, notes=(*layout.notes, seen))
 
 
 def _lines_behind(text: str, lines: Sequence[tuple[int, str]]) -> Iterator[tuple[int, str]]:
@@ -130,15 +130,15 @@ def _lines_behind(text: str, lines: Sequence[tuple[int, str]]) -> Iterator[tuple
 
 def _first_lines(text: str) -> list[tuple[int, str]]:
     """Return the first lines that are not blank, as many as are looked at, with their numbers."""
-    found: list[tuple[int, str]] = []
+    first: list[tuple[int, str]] = []
     left = _CHARACTERS
     for number, line in enumerate(islice(lines_of(text), _LOOKED_AT), 1):
         left -= len(line)
-        if left < 0 and found:
+        if left < 0 and first:
             break
         if line.strip():
-            found.append((number, line.rstrip("\r\n")[:_CHARACTERS]))
-    return found
+            first.append((number, line.rstrip("\r\n")[:_CHARACTERS]))
+    return first
 
 
 def _decoded(path: Path) -> tuple[str, str]:
@@ -190,8 +190,8 @@ def _split(lines: Sequence[tuple[int, str]], comment: str | None, delimiter: str
     rows = list(_cut(lines, comment, delimiter))
     widths = Counter(len(cells) for number, cells in rows if number > 0 and _numbers(cells, decimal) >= 2)
     width, _ = max(widths.items(), key=lambda item: item[0] * item[1], default=(0, 0))
-    found = sum(_numbers(cells, decimal) for number, cells in rows if number > 0 and len(cells) == width)
-    return _Split(delimiter, decimal, rows, width, found)
+    count = sum(_numbers(cells, decimal) for number, cells in rows if number > 0 and len(cells) == width)
+    return _Split(delimiter, decimal, rows, width, count)
 
 
 def _numbers(cells: Sequence[str], decimal: str) -> int:
@@ -212,7 +212,7 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
     enough = max(_ENOUGH, counts[len(counts) // 2] / 2)
     whole = [n > 0 and len(cells) == split.width for n, cells in first_rows]
     data = [i for i, (_, cells) in enumerate(first_rows) if whole[i] and _numbers(cells, split.decimal) >= enough]
-    headed = [i for i, found in enumerate(whole[:_HEADED]) if found and _is_heading(split.rows[i][1], split.decimal)]
+    headed = [i for i, count in enumerate(whole[:_HEADED]) if count and _is_heading(split.rows[i][1], split.decimal)]
     place = next((i for i in data if i > max(headed, default=-1)), data[0])
     above = [
         (abs(n), cells)
@@ -232,31 +232,31 @@ def _with_header(split: _Split, entries: dict[str, tuple[str | int, str]], path:
         notes = (f"line {other[0][0]} has {counted(other[0][1], 'cell')} where others have {split.width}{more}",)
     first = split.rows[place][0]
     lines = tuple(n for n, _ in rows)
-    made = GuessedLayout(entries, split.decimal, (), (), units, columns, lines, header=bool(above), notes=notes)
+    layout = GuessedLayout(entries, split.decimal, (), (), units, columns, lines, header=bool(above), notes=notes)
     numbers = tuple(str(n) for n in range(1, split.width + 1))
     if not above:
         entries["header"] = ("none", "no line of names stands above the numbers")
         if first > 1:
             entries["first_row"] = (first, "the first line of numbers")
-        return replace(made, names=numbers, headings=numbers)
+        return replace(layout, names=numbers, headings=numbers)
     line, names = above[-1]
     upper = above[-2][1] if len(above) > 1 else [""] * split.width
-    given = [name for name in names if name]
-    if len(set(given)) < len(given):
+    stated = [name for name in names if name]
+    if len(set(stated)) < len(stated):
         entries["header"] = ("none", f"line {line} has names twice, so that columns go by number")
         entries["first_row"] = (first, "the first line of numbers")
         headings = tuple(f"{over} {name}".strip() for over, name in zip(upper, names, strict=True))
-        return replace(made, names=numbers, headings=headings)
+        return replace(layout, names=numbers, headings=headings)
     if any(not name and any(column) for name, column in zip(names, columns, strict=True)):
         entries["header"] = ("none", f"line {line} leaves a column without a name, so that columns go by number")
         entries["first_row"] = (first, "the first line of numbers")
-        return replace(made, names=numbers, headings=tuple(n or over for over, n in zip(upper, names, strict=True)))
+        return replace(layout, names=numbers, headings=tuple(n or over for over, n in zip(upper, names, strict=True)))
     entries["header"] = (line, "the last line of names above the numbers")
     if first != line + 1:
         entries["first_row"] = (first, "the first line of numbers")
     if len(above) > 1 and sum(map(bool, above[-2][1])) > 1:
         notes = (f"line {above[-2][0]} looks like a second line of headings", *notes)
-    return replace(made, names=tuple(names), headings=tuple(names), notes=notes)
+    return replace(layout, names=tuple(names), headings=tuple(names), notes=notes)
 
 
 def _is_heading(cells: Sequence[str], decimal: str) -> bool:
@@ -270,8 +270,8 @@ def _bare(text: str) -> str:
 
 
 def _is_units(cells: Sequence[str]) -> bool:
-    given = [_bare(cell) for cell in cells if _bare(cell) not in ("", "-", "1")]
-    return bool(given) and all(cell in UNITS for cell in given)
+    units = [_bare(cell) for cell in cells if _bare(cell) not in ("", "-", "1")]
+    return bool(units) and all(cell in UNITS for cell in units)
 
 
 def _of_workbook(path: Path) -> GuessedLayout:
@@ -290,7 +290,7 @@ def _of_workbook(path: Path) -> GuessedLayout:
         split = _measured(rows)
         if split.numbers and (best is None or split.numbers > best[0].numbers):
             best = split, name
-    larger = max(left.values(), key=lambda found: found[0], default=None)
+    larger = max(left.values(), key=lambda candidate: candidate[0], default=None)
     if larger is not None and (best is None or larger[0] >= best[0].numbers):
         raise larger[1]
     if best is None:
@@ -304,9 +304,9 @@ def _of_workbook(path: Path) -> GuessedLayout:
     if len(book.names) > 1:
         because = f"it has the most numbers of {len(book.names)} sheets"
         entries["sheet"] = (best[1], because + (" that can be read" if left else ""))
-    made = _with_header(best[0], entries, path)
+    layout = _with_header(best[0], entries, path)
     unread = tuple(f"the sheet {name} was not read: {str(error).rstrip('.')}" for name, (_, error) in left.items())
-    return replace(made, notes=made.notes + unread)
+    return replace(layout, notes=layout.notes + unread)
 
 
 def _fewest(counts: Sequence[int]) -> float:

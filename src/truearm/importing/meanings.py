@@ -89,32 +89,32 @@ class Column:
     foreign: str = ""
 
     @cached_property
-    def given(self) -> list[str]:
+    def filled(self) -> list[str]:
         """Return the cells that are not empty."""
         return [text for text in self.texts if text]
 
     @cached_property
     def values(self) -> Array:
         """Return the numbers that stand in it."""
-        found = (number_of(text, self.decimal) for text in self.given)
-        return np.array([value for value in found if value is not None])
+        numbers = (number_of(text, self.decimal) for text in self.filled)
+        return np.array([value for value in numbers if value is not None])
 
     @cached_property
     def nothing(self) -> list[str]:
         """Return the texts among its numbers that seem to mean that nothing was measured."""
-        odd = dict.fromkeys(text for text in self.given if number_of(text, self.decimal) is None)
+        odd = dict.fromkeys(text for text in self.filled if number_of(text, self.decimal) is None)
         return [text for text in odd if NOTHING.fullmatch(text)]
 
     @property
     def is_numeric(self) -> bool:
         """Whether at least half of what stands in it are numbers, beside what seems to mean nothing."""
-        meant = [text for text in self.given if text not in self.nothing]
+        meant = [text for text in self.filled if text not in self.nothing]
         return len(self.values) > 0 and 2 * len(self.values) >= len(meant)
 
     @property
     def can_name(self) -> bool:
         """Whether what stands in it can be names: texts, or whole numbers."""
-        return not self.is_numeric or all(text.isdigit() for text in self.given)
+        return not self.is_numeric or all(text.isdigit() for text in self.filled)
 
     @property
     def counts(self) -> bool:
@@ -133,12 +133,12 @@ Triple = tuple[Column, Column, Column]
 
 def columns_of(layout: GuessedLayout) -> list[Column]:
     """Return the columns of a table."""
-    made = []
+    columns = []
     for place, (name, heading, texts) in enumerate(zip(layout.names, layout.headings, layout.columns, strict=True)):
         bare, unit, foreign = _name_and_unit(heading) if layout.header else (heading, "", "")
         words = tuple(word.lower() for word in _TOKEN.findall(bare)) if layout.header else ()
-        made.append(Column(place, name, unit or layout.units[place], words, texts, layout.decimal, foreign))
-    return made
+        columns.append(Column(place, name, unit or layout.units[place], words, texts, layout.decimal, foreign))
+    return columns
 
 
 def _name_and_unit(heading: str) -> tuple[str, str, str]:
@@ -153,9 +153,9 @@ def _name_and_unit(heading: str) -> tuple[str, str, str]:
             heading, foreign = bare, inside
             break
     for pattern in (_AT_THE_END, _GLUED):
-        found = pattern.fullmatch(heading)
-        if not foreign and found is not None and (unit := UNITS.get(found["unit"].strip())):
-            return found["name"], unit, ""
+        heading_match = pattern.fullmatch(heading)
+        if not foreign and heading_match is not None and (unit := UNITS.get(heading_match["unit"].strip())):
+            return heading_match["name"], unit, ""
     return heading, "", foreign
 
 
@@ -168,19 +168,19 @@ def joints_among(columns: Sequence[Column]) -> list[Column]:
         if not before or not number.isdigit() or before[-1] not in _JOINT or _NOT_MEASURED & set(before):
             continue
         groups.setdefault(tuple(before), {}).setdefault(int(number), column)
-    runs = [_run(found) for found in groups.values()]
+    runs = [_run(group) for group in groups.values()]
     for words in (_UR, _YASKAWA):
         named = {"".join(column.words): column for column in columns}
         runs.append([named[word] for word in words] if all(word in named for word in words) else [])
     return max(runs, key=len, default=[])
 
 
-def _run(found: dict[int, Column]) -> list[Column]:
+def _run(columns: dict[int, Column]) -> list[Column]:
     """Return columns whose numbers follow each other from 0 or 1."""
-    first = 0 if 0 in found else 1
+    first = 0 if 0 in columns else 1
     run = []
-    while first in found:
-        run.append(found[first])
+    while first in columns:
+        run.append(columns[first])
         first += 1
     return run
 
@@ -195,9 +195,9 @@ def triples_among(columns: Iterable[Column], last: Sequence[str]) -> dict[tuple[
                 groups.setdefault(key, {}).setdefault(words[at], column)
                 break
     return {
-        key: (found[last[0]], found[last[1]], found[last[2]])
-        for key, found in groups.items()
-        if len(found) == 3 and not _NOT_MEASURED & set(key)
+        key: (group[last[0]], group[last[1]], group[last[2]])
+        for key, group in groups.items()
+        if len(group) == 3 and not _NOT_MEASURED & set(key)
     }
 
 
@@ -209,27 +209,27 @@ def _may_be(columns: Iterable[Column], units: Sequence[str]) -> bool:
 def positions_among(columns: Sequence[Column]) -> dict[tuple[str, ...], Triple]:
     """Return the columns x, y, z of each target by the other words of their names."""
     columns = list(columns)
-    found = {
+    positions = {
         key: three
         for key, three in triples_among(columns, "xyz").items()
         if not (_DEVIATION | _DEVIATION_LETTERS | _NO_POSITION) & set(key) and _may_be(three, LENGTH_UNITS)
     }
-    if not found:  # px, py, pz of ROS and tx, ty, tz of trackers, where nothing else is called like a position
+    if not positions:  # px, py, pz of ROS and tx, ty, tz of trackers, where nothing else is called like a position
         named = {column.words[0]: column for column in columns if len(column.words) == 1}
         glued = [[named.get(letter + axis) for axis in "xyz"] for letter in "pt"]
         for three in ([column for column in names if column is not None] for names in glued):
             if len(three) == 3 and _may_be(three, LENGTH_UNITS):
                 return {(): (three[0], three[1], three[2])}
-    letters = {key for key in found if len("".join(key)) == 1}
+    letters = {key for key in positions if len("".join(key)) == 1}
     if all(_NO_TARGET & set(key) for key in letters):
-        found = {key: three for key, three in found.items() if key not in letters}
-    found = {key: three for key, three in found.items() if not (_NO_TARGET & set(key) and len(key) > 1)}
+        positions = {key: three for key, three in positions.items() if key not in letters}
+    positions = {key: three for key, three in positions.items() if not (_NO_TARGET & set(key) and len(key) > 1)}
     beside_nominal = any(_NOT_MEASURED & set(column.words) for column in columns)
     for words in (_MEASURED, _ACTUAL if beside_nominal else frozenset[str]()):
-        if chosen := {key: three for key, three in found.items() if words & set(key)}:
+        if chosen := {key: three for key, three in positions.items() if words & set(key)}:
             return chosen
-    measured = {key: three for key, three in found.items() if not (_TOOL & set(key) or _is_unit(three))}
-    return measured or found
+    measured = {key: three for key, three in positions.items() if not (_TOOL & set(key) or _is_unit(three))}
+    return measured or positions
 
 
 def stand_ins_among(positions: Sequence[Triple], others: Sequence[Column]) -> tuple[list[str], str | None]:
@@ -237,8 +237,8 @@ def stand_ins_among(positions: Sequence[Triple], others: Sequence[Column]) -> tu
 
     `others` are further columns in which the texts would be taken for nothing.
     """
-    found: dict[str, None] = {}
-    kept: list[str] = []
+    stand_ins: dict[str, None] = {}
+    elsewhere: list[str] = []
     somewhere: set[int] = set()
     for three in positions:
         rows = list(zip(*(column.texts for column in three), strict=True))
@@ -247,10 +247,10 @@ def stand_ins_among(positions: Sequence[Triple], others: Sequence[Column]) -> tu
         if 2 * len(alike) >= len(rows):
             alike = set()
         somewhere |= alike
-        found.update(dict.fromkeys(text for at in sorted(alike) for text in rows[at]))
-        kept += [text for at, row in enumerate(rows) if at not in alike for text in row]
-    kept += [text for column in others for at, text in enumerate(column.texts) if at not in somewhere]
-    return list(found), next((text for text in found if text in kept), None)
+        stand_ins.update(dict.fromkeys(text for at in sorted(alike) for text in rows[at]))
+        elsewhere += [text for at, row in enumerate(rows) if at not in alike for text in row]
+    elsewhere += [text for column in others for at, text in enumerate(column.texts) if at not in somewhere]
+    return list(stand_ins), next((text for text in stand_ins if text in elsewhere), None)
 
 
 def quaternion_among(columns: Sequence[Column]) -> tuple[list[Column], bool]:
@@ -475,20 +475,20 @@ class GuessedTime:
 
 def time_among(columns: Sequence[Column]) -> GuessedTime | None:
     """Return what tells the time of the rows; None if no column seems to, or all rows have the same."""
-    found = []
-    rest = list(columns)
-    while (column := named_like(rest, "time")) is not None:
-        rest.remove(column)
-        if len(set(column.given)) > 1:
-            found.append(column)
-    if not found:
+    of_time = []
+    others = list(columns)
+    while (column := named_like(others, "time")) is not None:
+        others.remove(column)
+        if len(set(column.filled)) > 1:
+            of_time.append(column)
+    if not of_time:
         return _running(columns)
-    dates = [column for column in found if not column.is_numeric and all(map(_is_day, column.given))]
-    times = [column for column in found if column not in dates]
-    if len(dates) == len(times) == 1 and _is_clock(times[0]) and len(dates[0].given) == len(times[0].given):
+    dates = [column for column in of_time if not column.is_numeric and all(map(_is_day, column.filled))]
+    times = [column for column in of_time if column not in dates]
+    if len(dates) == len(times) == 1 and _is_clock(times[0]) and len(dates[0].filled) == len(times[0].filled):
         return _of_columns(dates[0], times[0])
     if dates and (len(times) != 1 or _is_clock(times[0])):
-        names = " and ".join(column.name for column in found)
+        names = " and ".join(column.name for column in of_time)
         return _asked(f"{names} tell it together, or a day alone does not: write both into one column")
     return _of_columns(times[0])
 
@@ -510,14 +510,14 @@ def _running(columns: Sequence[Column]) -> GuessedTime | None:
 def _of_columns(column: Column, clock: Column | None = None) -> GuessedTime:
     if column.is_numeric:
         return GuessedTime((column,), f"{{column: {named(column)}}}", "its name")
-    given = column.given
+    texts = column.filled
     if clock is not None:
-        given = [f"{_bare_day(day)} {time}" for day, time in zip(column.given, clock.given, strict=True)]
+        texts = [f"{_bare_day(day)} {time}" for day, time in zip(column.filled, clock.filled, strict=True)]
     who = column.name if clock is None else f"{column.name} and {clock.name}"
-    formats = [way for way in _FORMATS if all(_reads(text, way) for text in given)]
+    formats = [way for way in _FORMATS if all(_reads(text, way) for text in texts)]
     if not formats:
-        return _asked(f"the times in {who}, such as {given[0][:40]}, are of no format that is known")
-    orders = {tuple(sorted(given, key=lambda text: _moment(text, way))) for way in formats}
+        return _asked(f"the times in {who}, such as {texts[0][:40]}, are of no format that is known")
+    orders = {tuple(sorted(texts, key=lambda text: _moment(text, way))) for way in formats}
     if len(orders) > 1:
         return _asked(f"{formats[0]} and {formats[1]} both read {who}, and tell different orders")
     shown = "iso" if formats[0] == "iso" else f"'{formats[0]}'"
@@ -532,7 +532,7 @@ def _of_columns(column: Column, clock: Column | None = None) -> GuessedTime:
 
 def _is_clock(column: Column) -> bool:
     """Return whether the texts of a column are times without a day."""
-    return any(all(_reads(text, way) for text in column.given) for way in _CLOCKS)
+    return any(all(_reads(text, way) for text in column.filled) for way in _CLOCKS)
 
 
 def _is_day(text: str) -> bool:

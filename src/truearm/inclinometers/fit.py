@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from truearm.engine.base.errors import InputError, Notice, Rule, counted, listed
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.inclinations import Inclinations, InclinometerReadings, Instruments, Pairs
+from truearm.engine.diagnose.advice import NOT_CONVERGED
 from truearm.engine.fit.frames import initial_frames
 from truearm.engine.fit.solver import solve
 from truearm.engine.robot.chain import Array
@@ -71,17 +72,17 @@ def inclination_derivatives(
     kinematics = robot.forward_kinematics(at)
     ends, links = link_ends(robot), np.array(mounted.links)
     n, count = len(at), len(mounted)
-    found = np.zeros((n, count, 3, len(names) + 3 * count))
+    derivatives = np.zeros((n, count, 3, len(names) + 3 * count))
     for column, moved in enumerate(_moved_elements(robot, at, names)):
-        by_parameter = found[..., column]
+        by_parameter = derivatives[..., column]
         for element, rate in moved.items():
             beyond = np.flatnonzero(links >= bisect_right(ends, element))  # on links that the element turns
             turning = kinematics.axis(element).T * np.broadcast_to(rate, n)[:, None]
             by_parameter[:, beyond] += np.einsum("nlkx,nx->nlk", levers[:, beyond], turning)
     for number, (link, mount) in enumerate(zip(mounted.links, mounted.mounts, strict=True)):
         first = len(names) + 3 * number
-        found[:, number, :, first : first + 3] = levers[:, number] @ kinematics.matrix(ends[link]) @ mount
-    return found
+        derivatives[:, number, :, first : first + 3] = levers[:, number] @ kinematics.matrix(ends[link]) @ mount
+    return derivatives
 
 
 def readable(robot: Robot, pairs: Pairs, instruments: Instruments | None = None) -> NDArray[np.bool_]:
@@ -316,17 +317,17 @@ class _Problem:
         """For each target of the poses, the readings that are compared, ``(pairs, 2)``."""
         if self.poses is None:
             return {}
-        poses, found = self.poses, {}
+        poses, pairs = self.poses, {}
         clear = np.asarray(decided(self.robot, poses.postures, upright=False).all(axis=1))
         for index, name in enumerate(poses.targets):
             reading = np.full(poses.configurations, -1)
-            mine = np.flatnonzero((poses.target == index) & poses.has_position & clear[poses.configuration])
-            reading[poses.configuration[mine]] = mine
+            rows = np.flatnonzero((poses.target == index) & poses.has_position & clear[poses.configuration])
+            reading[poses.configuration[rows]] = rows
             pair = reading.reshape(-1, 2)
-            found[name] = pair[(pair >= 0).all(axis=1)]
-        if not any(len(pair) for pair in found.values()):
+            pairs[name] = pair[(pair >= 0).all(axis=1)]
+        if not any(len(pair) for pair in pairs.values()):
             raise InputError("no pair of poses can be used", where=poses.source, allowed=DECIDING_MOMENTS)
-        return found
+        return pairs
 
     @property
     def components(self) -> NDArray[np.intp]:
@@ -395,7 +396,7 @@ class _Evaluation:
         if poses is None or poses.sigma is None:
             return []
         at = self._robot.loaded(poses.postures)
-        found = []
+        displacements = []
         for name, pair in self.problem.pairs.items():
             before, after = poses.configuration[pair].T
             kinematics = self._robot.forward_kinematics(at, name)
@@ -406,8 +407,8 @@ class _Evaluation:
             )
             r = (p[after] - p[before]) - (poses.position[pair[:, 1]] - poses.position[pair[:, 0]])
             rows = (J[after] - J[before]) / sigma[..., None]
-            found.append(((r / sigma).reshape(-1), rows.reshape(-1, len(self._names))))
-        return found
+            displacements.append(((r / sigma).reshape(-1), rows.reshape(-1, len(self._names))))
+        return displacements
 
 
 def tilting_parameters(robot: Robot) -> tuple[list[Parameter], list[Parameter]]:
@@ -461,14 +462,11 @@ def check_tilting(start: Robot, fit: TiltingFit, read: Inclinations, *, pushed: 
     )
 
 
-TILTING_NOT_CONVERGED: Final = Rule("tilting-not-converged", "error", "the solver's steps did not become small")
-
-
 def _not_converged(fit: TiltingFit) -> list[Notice]:
     if fit.converged:
         return []
     message = "The solver's steps did not become small. Check forces, payloads, masses and joint positions."
-    return [TILTING_NOT_CONVERGED(message)]
+    return [NOT_CONVERGED(message)]
 
 
 TILTING_BELOW_ZERO: Final = Rule(
@@ -533,7 +531,7 @@ def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
     upright = set(_upright(start))
     by_poses = [name for name in unseen if _number(name) in upright and not name.startswith("clearance")]
     others = [name for name in unseen if name not in by_poses]
-    told = []
+    notices = []
     if by_poses:
         cure = (
             "The poses under loads do not tell them either: push the flange sideways, one way and the other."
@@ -541,15 +539,15 @@ def _unseen(start: Robot, fit: TiltingFit, *, pushed: bool) -> list[Notice]:
             else "They come from poses: at the same joint positions push the flange sideways, one way and the other, "
             "and give the poses of both as `pushed`."
         )
-        told.append(
+        notices.append(
             UPRIGHT_UNSEEN(
                 f"{_stay(by_poses)}: gravity does not turn a joint whose axis stands "
                 f"upright, and inclinometers do not see its turn. {cure}"
             )
         )
     if others:
-        told.append(TILTING_UNSEEN(f"{_stay(others)}: no change of load that was read tells them well."))
-    return told
+        notices.append(TILTING_UNSEEN(f"{_stay(others)}: no change of load that was read tells them well."))
+    return notices
 
 
 def _stay(names: Sequence[str]) -> str:

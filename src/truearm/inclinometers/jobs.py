@@ -179,9 +179,9 @@ class FindTilting(OfRobot, Split, Loaded, Noted, IntoFolder, Repeatable, Long):
 
     def run(self) -> Tilting:
         """Find it."""
-        from truearm.inclinometers.tilting import found
+        from truearm.inclinometers.tilting import tilting_identified
 
-        return found(self)
+        return tilting_identified(self)
 
 
 plan_inclinometers = job(PlanInclinometers)

@@ -25,7 +25,7 @@ from truearm.inclinometers.fit import link_ends, upwards
 #: What an uncalibrated arm may leave of the angles, root mean square [rad].
 _FITS: Final = math.radians(3.0)
 #: A turn that is worth a word [rad].
-_TOLD: Final = math.radians(5.0)
+_NOTED_TURN: Final = math.radians(5.0)
 #: An instrument that is turned further does not sit as the file states [rad].
 _AS_STATED: Final = math.radians(30.0)
 #: How far an instrument sits from one of the 24 ways, and its zero, one standard deviation [rad].
@@ -76,7 +76,7 @@ def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
     mounts, zeros, notices = [], [], []
     for number, (name, link) in enumerate(zip(read.instruments.names, read.instruments.links, strict=True)):
         angle = read.angle[:, number]
-        mount, zero, left = (found[0] for found in _turned(plumb[link], angle, np.eye(3)[None]))
+        mount, zero, left = (array[0] for array in _turned(plumb[link], angle, np.eye(3)[None]))
         few = int(np.isfinite(angle).any(axis=1).sum()) < _LEAST  # too few to tell a turn from a zero
         if few or left > _FITS or _turn_of(mount) > _AS_STATED:
             if not few and _unlike(plumb[link], angle) > _FITS:
@@ -84,11 +84,11 @@ def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
             mount, zero = np.eye(3), _zeros_as_stated(plumb[link], angle)
         mounts.append(mount)
         zeros.append(np.where(np.isfinite(angle).any(axis=0), zero, np.nan))
-    found = Mounting(np.array(mounts), np.array(zeros), ())
+    mounting = Mounting(np.array(mounts), np.array(zeros), ())
     turned = [
         f"{name} by {math.degrees(turn):.1f} deg"
-        for name, turn in zip(read.instruments.names, found.turns.tolist(), strict=True)
-        if turn > _TOLD
+        for name, turn in zip(read.instruments.names, mounting.turns.tolist(), strict=True)
+        if turn > _NOTED_TURN
     ]
     if turned:
         notices.append(
@@ -96,7 +96,7 @@ def find_mounting(robot: Robot, read: Inclinations) -> Mounting:
                 f"By their angles instruments sit turned on their links: {listed(turned)}. This is taken into account."
             )
         )
-    return Mounting(found.mounts, found.zeros, tuple(notices))
+    return Mounting(mounting.mounts, mounting.zeros, tuple(notices))
 
 
 def _turn_of(R: Array) -> float:
@@ -128,32 +128,32 @@ def _turned(plumb: Array, angle: Array, start: Array) -> tuple[Array, Array, Arr
         Rotations ``(ways, 3, 3)``, zeros ``(ways, 3)`` [rad], and what is left of the angles, root mean square [rad],
         ``(ways,)``.
     """
-    there = np.isfinite(angle)
+    is_read = np.isfinite(angle)
     M, w, zero = start.copy(), np.zeros((len(start), 3)), np.zeros((len(start), 3))
     weight = np.diag(np.r_[np.full(3, (_SIGMA / _TURN) ** 2), np.full(3, (_SIGMA / _ZERO) ** 2)])
     for _ in range(_ROUNDS):
-        r, J = _residual(plumb, angle, there, M, zero)
+        r, J = _residual(plumb, angle, is_read, M, zero)
         N = np.einsum("waip,waiq->wpq", J, J) + weight
         g = np.einsum("waip,wai->wp", J, r) + np.concatenate([w, zero], axis=1) @ weight
         step = np.clip(-np.linalg.solve(N, g[..., None])[..., 0], -0.5, 0.5)
         w, zero = w + step[:, :3], zero + step[:, 3:]
         M = M @ _rotations(step[:, :3])
-    r, _ = _residual(plumb, angle, there, M, zero)
-    return M, zero, np.asarray(np.sqrt((r**2).sum(axis=(1, 2)) / max(int(there.sum()), 1)))
+    r, _ = _residual(plumb, angle, is_read, M, zero)
+    return M, zero, np.asarray(np.sqrt((r**2).sum(axis=(1, 2)) / max(int(is_read.sum()), 1)))
 
 
-def _residual(plumb: Array, angle: Array, there: Array, M: Array, zero: Array) -> tuple[Array, Array]:
+def _residual(plumb: Array, angle: Array, is_read: Array, M: Array, zero: Array) -> tuple[Array, Array]:
     """Return predicted less read angles, each times its cosine, and the derivative by turn and zero."""
     rising = np.einsum("ni,wia->wna", plumb, M)
     cosine = np.sqrt(np.maximum(1.0 - rising**2, 0.0))
     predicted = np.arcsin(np.clip(rising, -1.0, 1.0))
-    r = np.where(there, cosine * (predicted + zero[:, None] - np.where(there, angle, 0.0)), 0.0)
+    r = np.where(is_read, cosine * (predicted + zero[:, None] - np.where(is_read, angle, 0.0)), 0.0)
     J = np.zeros((*r.shape, 6))
     for axis, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         J[:, :, j, axis] = rising[:, :, k]  # a turn about x takes y to z, and z to -y
         J[:, :, k, axis] = -rising[:, :, j]
         J[:, :, axis, 3 + axis] = cosine[:, :, axis]
-    return r, np.where(there[..., None], J, 0.0)
+    return r, np.where(is_read[..., None], J, 0.0)
 
 
 def _rotations(w: Array) -> Array:

@@ -236,10 +236,10 @@ class InclinometerPlan(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give what was chosen, and how accurate every constant will be."""
-        how = f"under pulls of {self.pull:g} N at the flange" if self.pull else "by gravity alone"
+        load = f"under pulls of {self.pull:g} N at the flange" if self.pull else "by gravity alone"
         inclined, posed = 2 * len(self.made.inclined), 2 * len(self.made.posed)
         yield say(
-            f"{counted(inclined, 'configuration')} for inclinometers, in pairs, {how}.",
+            f"{counted(inclined, 'configuration')} for inclinometers, in pairs, {load}.",
             inclined=inclined,
             posed=posed,
             pull_n=self.pull,
@@ -327,10 +327,10 @@ class InclinometerSimulation(Record):
         read = self.inclinations
         angles, pushed = int(np.isfinite(read.angle).sum()), 0 if self.pushed is None else self.pushed.configurations
         beside = "" if self.pushed is None else f"; {counted(pushed, 'configuration')} for poses under loads"
-        where = f": {listed([str(file) for file in self.files])}" if self.files else ""
+        destination = f": {listed([str(file) for file in self.files])}" if self.files else ""
         yield say(
             f"{counted(len(read.labels), 'configuration')} of {self.robot} ({self.truth}), {angles} angles of "
-            f"{len(read.instruments)} inclinometers{beside}{where}",
+            f"{len(read.instruments)} inclinometers{beside}{destination}",
             robot=self.robot,
             truth=self.truth,
             configurations=len(read.labels),
@@ -344,8 +344,8 @@ class InclinometerSimulation(Record):
         """Return what its files hold, by name."""
         if self.out is None:
             return {}
-        held = {self.out.name: inclinations_text(self.inclinations)}
-        return held if self.pushed is None else held | {pushed_file(self.out).name: csv_text(self.pushed)}
+        contents = {self.out.name: inclinations_text(self.inclinations)}
+        return contents if self.pushed is None else contents | {pushed_file(self.out).name: csv_text(self.pushed)}
 
 
 #: Of a two-axis inclinometer (Patel, section 4.4.1) [rad]. It has the axes x and y of its link.
@@ -372,12 +372,12 @@ def planned(asked: PlanInclinometers) -> InclinometerPlan:
     finder = finder_argument(carrying, None, "", cell, home)
     asked.progress("choosing pairs of configurations")
     rng = np.random.default_rng(asked.seed)
-    made = planned_pairs(carrying, asked.poses, rng, asked.pull, asked.candidates, asked.noise, finder)
+    plan = planned_pairs(carrying, asked.poses, rng, asked.pull, asked.candidates, asked.noise, finder)
     asked.progress("looking for ways that keep clear")
-    at = np.concatenate([pairs.joints_in_turn()[0] for pairs in (made.inclined, made.posed) if len(pairs)])
+    at = np.concatenate([pairs.joints_in_turn()[0] for pairs in (plan.inclined, plan.posed) if len(pairs)])
     tour = tour_of(finder, at, [str(k + 1) for k in range(len(at))])
     inclinometer_plan = InclinometerPlan(
-        carrying, made, asked.pull, asked.again, tour, files_of(asked.robot), joints_are
+        carrying, plan, asked.pull, asked.again, tour, files_of(asked.robot), joints_are
     )
     if table is None:
         return inclinometer_plan
@@ -515,7 +515,7 @@ def simulated(asked: SimulateInclinometers) -> InclinometerSimulation:
         read = replace(read, joints=nominal.controller.from_model(read.joints), joints_are="controller")
         pushed = None if pushed is None else in_controller_joints(nominal, pushed)
     named = truth.name if isinstance(truth, Robot) else str(truth)
-    made = InclinometerSimulation(nominal.name, named, read, pushed, file)
+    simulation = InclinometerSimulation(nominal.name, named, read, pushed, file)
     if file is not None:
-        write_files(file.parent, made.texts())
-    return made
+        write_files(file.parent, simulation.texts())
+    return simulation

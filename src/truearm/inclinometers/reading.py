@@ -19,7 +19,7 @@ from truearm.engine.data.dataset import IntArray
 from truearm.engine.data.inclinations import Inclinations, Instruments
 from truearm.engine.data.readers.canonical import refuse_other_separators
 from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cells
-from truearm.engine.data.readers.rows import Configurations, found_configurations, same_everywhere
+from truearm.engine.data.readers.rows import Configurations, row_configurations, same_everywhere
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.urdf_writing import COLUMN, JOINT_COLUMN, joint_names
 
@@ -72,7 +72,7 @@ def read_inclinations(path: Path) -> Inclinations:
     cells = read_cells(text, str(path), Layout(header=header))
     columns = _columns(cells)
     joints_are, names = joint_names(columns, f"{path}, line {header}")
-    configurations = found_configurations(
+    configurations = row_configurations(
         cells,
         cells.texts(columns["configuration"][0]),
         [columns[name][0] for name in names],
@@ -120,7 +120,7 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
     """Return place and unit of every column by its name, or refuse the header."""
     columns: dict[str, tuple[int, str]] = {}
     for place, heading in enumerate(cells.names):
-        where = f"{cells.source}, line {cells.header}, column {place + 1}"
+        location = f"{cells.source}, line {cells.header}, column {place + 1}"
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
         units = (*ANGLE_UNITS, *LENGTH_UNITS) if JOINT_COLUMN.fullmatch(name) else _UNITS.get(name)
@@ -131,20 +131,20 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
                 cure = "This looks like readings of targets, which are given as `poses`."
             raise InputError(
                 "the column is not known" if heading else "the column has no name",
-                where=where,
+                where=location,
                 came=heading,
                 allowed=_ALLOWED,
                 cure=cure,
             )
         if name in columns:
-            raise InputError(f"the column {name} appears twice", where=where, cure="Remove one of them.")
+            raise InputError(f"the column {name} appears twice", where=location, cure="Remove one of them.")
         if units is not None:
-            unit = checked_unit(unit, units, f"{where}, {heading}")
+            unit = checked_unit(unit, units, f"{location}, {heading}")
         elif unit is not None:
-            raise InputError("this column takes no unit", where=where, came=heading, allowed=name)
+            raise InputError("this column takes no unit", where=location, came=heading, allowed=name)
         columns[name] = (place, unit or "1")
-    where = f"{cells.source}, line {cells.header}"
-    joint_names(columns, where)
+    location = f"{cells.source}, line {cells.header}"
+    joint_names(columns, location)
     needed = ["configuration", "link", *(() if any(axis in columns for axis in _AXES) else ("x", "y")), "sigma"]
     for group in (_FORCE, _MOMENT, ("payload", *_COG)):
         if any(name in columns for name in (*group, *(_MOMENT if group == _FORCE else ()))):
@@ -153,7 +153,7 @@ def _columns(cells: Cells) -> dict[str, tuple[int, str]]:
     if missing:
         raise InputError(
             f"the column {missing[0]} is missing",
-            where=where,
+            where=location,
             allowed=_ALLOWED,
             cure=f"Add {', '.join(_SHOWN[name] for name in missing)}.",
         )

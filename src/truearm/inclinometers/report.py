@@ -46,19 +46,19 @@ _WORDS = {
 }
 
 
-def tilting_html(found: Tilting) -> str:
+def tilting_html(tilting: Tilting) -> str:
     """Return the report of both stages."""
-    source, rows = Path(found.read.source).name, found.constants()
-    geometry = found.geometry
+    source, rows = Path(tilting.read.source).name, tilting.constants()
+    geometry = tilting.geometry
     with_geometry = "" if geometry is None else f", {Path(geometry.data.source.replace(chr(92), '/')).name}"
-    pushed = f"; {found.pushed} configurations of poses under loads" if found.pushed else ""
+    pushed = f"; {tilting.pushed} configurations of poses under loads" if tilting.pushed else ""
     facts = [
-        ("Robot", f"{found.robot.title} (`{found.robot.name}`)"),
-        *((name.capitalize(), said) for name, said in found.notes.items()),
-        ("Inclinometers", "; ".join(found.read.instruments.names)),
+        ("Robot", f"{tilting.robot.title} (`{tilting.robot.name}`)"),
+        *((name.capitalize(), text) for name, text in tilting.notes.items()),
+        ("Inclinometers", "; ".join(tilting.read.instruments.names)),
         (
             "Compared",
-            f"{len(found.read.pairs)} pairs of configurations, {found.used} changes of inclination{pushed}",
+            f"{len(tilting.read.pairs)} pairs of configurations, {tilting.used} changes of inclination{pushed}",
         ),
     ]
     dots = (
@@ -67,41 +67,41 @@ def tilting_html(found: Tilting) -> str:
     )
     bars = "Bars reach two standard deviations to either side. A joint that no load told is left out."
     return Document(
-        f"Tilting joints of {found.robot.title} – {source}",
+        f"Tilting joints of {tilting.robot.title} – {source}",
         [
             Facts(facts),
-            Section("", [*_accuracy(found), _inclinations(found), *warned(found.warnings)], "result"),
+            Section("", [*_accuracy(tilting), _inclinations(tilting), *warned(tilting.warnings)], "result"),
             pictured("angles", "Tilt and backlash of each joint", bars, angles_figure(rows)),
             Section("Compliance of each joint", [Picture("compliances", compliances_figure(rows))]),
             _constants(rows),
-            pictured("changes", "Changes of inclination, pair by pair", dots, changes_figure(found)),
+            pictured("changes", "Changes of inclination, pair by pair", dots, changes_figure(tilting)),
             *(
-                [pictured("errors", "Errors of poses", f"On the {_judged(found)}.", errors_figure(found))]
+                [pictured("errors", "Errors of poses", f"On the {_judged(tilting)}.", errors_figure(tilting))]
                 if geometry
                 else []
             ),
-            _seats(found),
+            _seats(tilting),
         ],
-        found.command,
-        headline=f"Tilting joints of {found.robot.title}",
+        tilting.command,
+        headline=f"Tilting joints of {tilting.robot.title}",
         subtitle=f"Data: {source}{with_geometry}",
-        history=found.robot.history,
-    ).html(found)
+        history=tilting.robot.history,
+    ).html(tilting)
 
 
-def _judged(found: Tilting) -> str:
-    held = found.geometry is not None and found.geometry.validation is not None
-    return "configurations that no fit has seen" if held else "training configurations"
+def _judged(tilting: Tilting) -> str:
+    held_out = tilting.geometry is not None and tilting.geometry.validation is not None
+    return "configurations that no fit has seen" if held_out else "training configurations"
 
 
-def _accuracy(found: Tilting) -> list[Block]:
+def _accuracy(tilting: Tilting) -> list[Block]:
     """Return what becomes of the errors of poses, where they were read."""
-    spread = [(name, *_figures(errors)) for name, errors in _errors(found).items() if errors.position is not None]
+    spread = [(name, *_figures(errors)) for name, errors in _errors(tilting).items() if errors.position is not None]
     if not spread:
         return []
     (_, nominal, *_), (_, alone, *_), (_, first, *_) = spread
     words = [
-        Words(f"Mean position error on the {_judged(found)}: geometry alone → tilting first."),
+        Words(f"Mean position error on the {_judged(tilting)}: geometry alone → tilting first."),
         Words(
             f"Nominal robot: {nominal} mm. The full report of the geometry is geometry.html beside this page.",
             quiet=True,
@@ -111,15 +111,17 @@ def _accuracy(found: Tilting) -> list[Block]:
     return [Lead(words, first, alone, "mm", "position"), Table(heading, spread, look="spread")]
 
 
-def _inclinations(found: Tilting) -> Lead:
-    changed, left = (math.degrees(size) for size in found.sizes)
-    wider = ", by which the deviations below are widened" if found.fit.excess > 1 else ""
+def _inclinations(tilting: Tilting) -> Lead:
+    changed, left = (math.degrees(size) for size in tilting.sizes)
+    wider = ", by which the deviations below are widened" if tilting.fit.excess > 1 else ""
     words = [
         Words(
             "Changes of inclination that were read, root mean square → what tilt, backlash and compliance leave of "
             "them."
         ),
-        Words(f"What is left is {found.fit.excess:.2f} times as large as the declared deviations{wider}.", quiet=True),
+        Words(
+            f"What is left is {tilting.fit.excess:.2f} times as large as the declared deviations{wider}.", quiet=True
+        ),
     ]
     return Lead(words, significant(left, 2, 6), significant(changed, 3), "deg", "inclination")
 
@@ -149,7 +151,7 @@ def _constants(rows: list[dict[str, Any]]) -> Section:
     return Section("", [table, Words(words)], "constants")
 
 
-def _seats(found: Tilting) -> Section:
+def _seats(tilting: Tilting) -> Section:
     words = (
         "Found from the angles themselves. Only changes of inclination are used, so zeros do not matter; a turn of the "
         "instrument on its link is taken into account."
@@ -160,20 +162,20 @@ def _seats(found: Tilting) -> Section:
             f"{seat['turned_deg']:.2f}",
             ", ".join(f"{axis} {zero:+.3f}" for axis, zero in seat["zero_deg"].items()),
         )
-        for seat in found.seats()
+        for seat in tilting.seats()
     ]
     table = Table(("instrument", "turned [deg]", "zeros [deg]"), rows, texts=(2,))
     return Section("How the instruments sit", [Words(words), table], "instruments")
 
 
-def _errors(found: Tilting) -> dict[str, Errors]:
+def _errors(tilting: Tilting) -> dict[str, Errors]:
     """Return errors by the robot that makes them, on configurations that no fit has seen where some were held out."""
-    if found.geometry is None or found.geometry_alone is None:
+    if tilting.geometry is None or tilting.geometry_alone is None:
         return {}
     return {
-        "nominal": found.geometry_alone.nominal,
-        "geometry alone": found.geometry_alone.validation or found.geometry_alone.train,
-        "tilting first": found.geometry.validation or found.geometry.train,
+        "nominal": tilting.geometry_alone.nominal,
+        "geometry alone": tilting.geometry_alone.validation or tilting.geometry_alone.train,
+        "tilting first": tilting.geometry.validation or tilting.geometry.train,
     }
 
 
@@ -226,13 +228,13 @@ def _bars(rows: list[dict[str, Any]], effects: tuple[str, ...], title: str) -> F
     )
 
 
-def changes_figure(found: Tilting) -> Figure:
+def changes_figure(tilting: Tilting) -> Figure:
     """Show the changes of inclination in the order of measurement, and what is left of them."""
-    used = np.isfinite(found.fit.left)
+    used = np.isfinite(tilting.fit.left)
     order = np.broadcast_to(np.arange(1, len(used) + 1)[:, None, None], used.shape)[used]
-    names = [f"{html.escape(name)}, {letter}" for name in found.read.instruments.names for letter in "xyz"]
+    names = [f"{html.escape(name)}, {letter}" for name in tilting.read.instruments.names for letter in "xyz"]
     labels = np.broadcast_to(np.array(names).reshape(1, -1, 3), used.shape)[used].tolist()
-    sizes = [np.abs(np.degrees(values[used])) for values in (found.changes.change, found.fit.left)]
+    sizes = [np.abs(np.degrees(values[used])) for values in (tilting.changes.change, tilting.fit.left)]
     low = 1e-5
     traces: list[Figure] = [
         {
@@ -258,9 +260,9 @@ def changes_figure(found: Tilting) -> Figure:
     )
 
 
-def errors_figure(found: Tilting) -> Figure:
+def errors_figure(tilting: Tilting) -> Figure:
     """Show how errors are distributed, before, with geometry alone, and with tilting first."""
-    errors = {name: 1e3 * error.position_norms for name, error in _errors(found).items()}
+    errors = {name: 1e3 * error.position_norms for name, error in _errors(tilting).items()}
     errors = {name: values for name, values in errors.items() if len(values)}
     every = np.concatenate([*errors.values()]) if errors else np.array([0.1, 1.0])
     low, high = max(float(every.min()), 1e-4) * 0.9, max(float(every.max()), 1e-3) * 1.1

@@ -153,7 +153,7 @@ class Tilting(Record):
         rows = self.constants()
         joints = dict.fromkeys(row["joint"] for row in rows)
         words = {joint: ", ".join(_words(row) for row in rows if row["joint"] == joint) for joint in joints}
-        yield tell(*(f"  joint {joint}: {said}" for joint, said in words.items()), constants=rows)
+        yield tell(*(f"  joint {joint}: {text}" for joint, text in words.items()), constants=rows)
         after, alone = self.geometry, self.geometry_alone
         yield say(
             geometry=None if after is None else after.summary(),
@@ -261,24 +261,24 @@ class _First:
     robot: Robot  #: With what is known of its constants.
     changes: InclinometerReadings
     mounting: Mounting
-    told: tuple[Notice, ...]
+    notices: tuple[Notice, ...]
 
 
-def found(asked: FindTilting) -> Tilting:
+def tilting_identified(asked: FindTilting) -> Tilting:
     """Read, find tilt, backlash and stiffness, then the geometry, and write both."""
     refuse_swapped(asked.robot, asked.inclinations, "tilting")
-    given = asked.robot, asked.inclinations, asked.poses, asked.pushed
-    inputs = files_of(*given)
+    sources = asked.robot, asked.inclinations, asked.poses, asked.pushed
+    inputs = files_of(*sources)
     if asked.out is not None:
-        folder_for((*TILTING_FILES, GEOMETRY), asked.out, *given, ours=True)
+        folder_for((*TILTING_FILES, GEOMETRY), asked.out, *sources, ours=True)
     read = _read(asked)
     first = _first(asked, read)
     geometry = alone = None
-    told = first.told
+    notices = first.notices
     if read.poses is not None:
         geometry, alone = _geometry(asked, read, first)
-        told = (*told, *_compared(geometry, alone))
-    made = Tilting(
+        notices = (*notices, *_compared(geometry, alone))
+    tilting = Tilting(
         fit=first.fit,
         robot=first.robot if geometry is None else geometry.robot,
         read=read.inclinations,
@@ -287,15 +287,15 @@ def found(asked: FindTilting) -> Tilting:
         pushed=0 if read.pushed is None else read.pushed.configurations,
         geometry=geometry,
         geometry_alone=alone,
-        notices=told,
+        notices=notices,
         command=asked.again,
         urdf=read.urdf,
         inputs=inputs,
         notes=dict(asked.notes or {}),
     )
     if asked.out is not None:
-        made.save(asked.out, asked.progress)
-    return made
+        tilting.save(asked.out, asked.progress)
+    return tilting
 
 
 def _read(asked: FindTilting) -> _Read:
@@ -309,7 +309,7 @@ def _read(asked: FindTilting) -> _Read:
     inclinations = _inclinations(robot, asked.inclinations)
     pushed = None if asked.pushed is None else readings_argument(robot, asked.pushed, "pushed")
     poses = None if asked.poses is None else readings_argument(robot, asked.poses, "poses")
-    robot = robot.marked(any(one is not None and one.simulated for one in (inclinations, pushed)))
+    robot = robot.marked(any(data is not None and data.simulated for data in (inclinations, pushed)))
     if poses is not None:
         with refusals_of("train"):
             train_count(asked.train, poses.configurations, poses.source)
@@ -337,9 +337,9 @@ def _first(asked: FindTilting, read: _Read) -> _First:
         of_poses = read.pushed is not None and error.where == read.pushed.source
         name_parameter(error, "pushed" if of_poses else "inclinations")
         raise
-    told = (*check_tilting(start, fit, inclinations, pushed=read.pushed is not None), *mounting.notices)
-    proven = _proven(start, fit, inclinations, changes.pairs.in_turn.joints, told)
-    return _First(fit, proven, changes, mounting, told)
+    notices = (*check_tilting(start, fit, inclinations, pushed=read.pushed is not None), *mounting.notices)
+    proven = _proven(start, fit, inclinations, changes.pairs.in_turn.joints, notices)
+    return _First(fit, proven, changes, mounting, notices)
 
 
 def _geometry(asked: FindTilting, read: _Read, first: _First) -> tuple[Calibration, Calibration]:
@@ -359,23 +359,23 @@ def _geometry(asked: FindTilting, read: _Read, first: _First) -> tuple[Calibrati
         return geometry, calibrate(read.robot, read.poses, **options)
 
 
-def _inclinations(robot: Robot, given: object) -> Inclinations:
+def _inclinations(robot: Robot, source: object) -> Inclinations:
     """Return what inclinometers read, at the joint positions of the robot's model."""
-    if isinstance(given, Inclinations):
-        read = given
-    elif isinstance(given, str | Path):
-        path = path_argument(given, "inclinations")
-        if is_robot(given):
+    if isinstance(source, Inclinations):
+        read = source
+    elif isinstance(source, str | Path):
+        path = path_argument(source, "inclinations")
+        if is_robot(source):
             raise InputError(
                 "this is a robot, and what inclinometers read belongs here",
                 parameter="inclinations",
-                came=str(given),
+                came=str(source),
                 allowed="a CSV file of inclinations",
             )
         with refusals_of("inclinations"):
             read = read_inclinations(path)
     else:
-        raise wrong_kind("inclinations belong here", given, "inclinations", "Inclinations, or a CSV file of them")
+        raise wrong_kind("inclinations belong here", source, "inclinations", "Inclinations, or a CSV file of them")
     with refusals_of("inclinations"):
         check_joints(robot, read)
         if read.joints_are != "controller":
@@ -384,7 +384,7 @@ def _inclinations(robot: Robot, given: object) -> Inclinations:
         return replace(read, joints=robot.controller.to_model(read.joints), joints_are="converted")
 
 
-def _proven(robot: Robot, fit: TiltingFit, read: Inclinations, joints: Array, told: Sequence[Notice]) -> Robot:
+def _proven(robot: Robot, fit: TiltingFit, read: Inclinations, joints: Array, notices: Sequence[Notice]) -> Robot:
     """Return the robot of the first stage with what is known of its constants."""
     history = (
         f"tilt, backlash and compliance by inclinometers with truearm {__version__}:"
@@ -394,15 +394,15 @@ def _proven(robot: Robot, fit: TiltingFit, read: Inclinations, joints: Array, to
     region = list(zip(joints.min(axis=0).tolist(), joints.max(axis=0).tolist(), strict=True))
     proof = Proof.of(
         "converged" if fit.converged else "not-converged",
-        [notice for notice in told if notice.level == "error"],
+        [notice for notice in notices if notice.level == "error"],
         region,
         np.zeros(len(robot.joints)),
         parameters,
         fit.covariance,
         lower_bound=not all(map(seen, parameters)),
     )
-    made = replace(fit.robot, history=(*fit.robot.history, history), tools={}, truths={}, proof=None)
-    return sealed(made, proof)
+    identified = replace(fit.robot, history=(*fit.robot.history, history), tools={}, truths={}, proof=None)
+    return sealed(identified, proof)
 
 
 TILTING_NOT_BETTER: Final = Rule(
@@ -417,7 +417,7 @@ TILTING_NOT_BETTER: Final = Rule(
 
 def _compared(geometry: Calibration, alone: Calibration) -> list[Notice]:
     """Say if the constants do not help the poses."""
-    errors = [one.validation or one.train for one in (geometry, alone)]
+    errors = [calibration.validation or calibration.train for calibration in (geometry, alone)]
     after, before = (error.position or error.length for error in errors)
     if after is None or before is None or after.mean < before.mean:
         return []

@@ -44,7 +44,7 @@ class _Criteria(Names):
         known = ("all", *CRITERIA)
         by_small = {criterion.lower(): criterion for criterion in known}
         if isinstance(value, Sequence) and not isinstance(value, str):
-            value = [by_small.get(one.lower(), one) if isinstance(one, str) else one for one in value]
+            value = [by_small.get(entry.lower(), entry) if isinstance(entry, str) else entry for entry in value]
         wanted = choices_argument(value, name, known, "criterion")
         if not wanted:
             raise InputError("no criterion is given", parameter=name, allowed=", ".join(known))
@@ -66,14 +66,16 @@ class _Percent(Numbers):
         percent = numbers_argument(value, name, len(value) if isinstance(value, Sequence) else 1, allowed)
         if not percent:
             raise InputError("no number is given", parameter=name, allowed=allowed)
-        for one in percent:
-            if not (1.0 < one <= 100.0 or (one == 0.0 and self.may_be_zero)):
+        for percentage in percent:
+            if not (1.0 < percentage <= 100.0 or (percentage == 0.0 and self.may_be_zero)):
                 raise InputError(
                     "these are percent of the rated one",
                     parameter=name,
-                    came=Words(f"{one:g} %"),
+                    came=Words(f"{percentage:g} %"),
                     allowed=allowed,
-                    cure=f"Give {100 * one:g}, not {one:g}, if this is a share." if 0.0 < one <= 1.0 else None,
+                    cure=f"Give {100 * percentage:g}, not {percentage:g}, if this is a share."
+                    if 0.0 < percentage <= 1.0
+                    else None,
                 )
         return percent
 

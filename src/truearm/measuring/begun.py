@@ -43,7 +43,7 @@ def begin(
     Raises:
         InputError: If the folder holds the measuring of another plan or robot, or one that began otherwise.
     """
-    now: dict[str, Any] = {
+    current: dict[str, Any] = {
         "truearm": _SCHEMA,
         "plan": hash_of(plan),
         "robot": f"{robot.name} {hash_of([[p.name, p.value] for p in robot.parameters.values()])}",
@@ -63,11 +63,11 @@ def begin(
                 where=str(folder / LOG),
                 cure="Choose another folder.",
             )
-        write_text(path, json.dumps(now, indent=2) + "\n")
+        write_text(path, json.dumps(current, indent=2) + "\n")
         return
     with refusals_of("out"):
         then = _then(path)
-    for name, value in now.items():
+    for name, value in current.items():
         was: Any = then.get(name)
         if name == "about":
             changed = [k for k, v in value.items() if v is not None and was.get(k) not in (None, v)]
@@ -80,7 +80,7 @@ def begin(
         if name == "plan":  # a hash
             came, allowed = "the plan as it is now", "the plan as it was then"
         elif name == "robot":  # a name and a hash
-            came, allowed = (str(said).rpartition(" ")[0] for said in (value, was))
+            came, allowed = (str(text).rpartition(" ")[0] for text in (value, was))
             if came == allowed:
                 came, allowed = f"{came} with other values", f"{allowed} as it was then"
         raise InputError(
@@ -145,8 +145,8 @@ def virtual_source(
     device = virtual_device(str(asked.device))
     rules = constraints_argument(asked.constraints)
     with refusals_of("truth"):
-        made = truth if isinstance(truth, Robot) else str(truth)
-        twin = truth_twin(nominal, made, np.random.default_rng(seed))
+        arm = truth if isinstance(truth, Robot) else str(truth)
+        twin = truth_twin(nominal, arm, np.random.default_rng(seed))
     twin = replace(twin, robot=twin.robot.with_payload(payload_argument(asked.payload)))
     twin, placed = seen_by(device, nominal, twin)
     source = VirtualInstrument(device, twin, placed, joints, nests, seed, disturbed, drift, asked.noise, before)

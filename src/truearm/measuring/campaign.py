@@ -72,16 +72,16 @@ class Campaign:
         if not self._coming:
             self._coming.extend(self.source.poll(self.session, seconds))
         for _ in range(len(self._coming) if most is None else min(most, len(self._coming))):
-            one = self._coming.popleft()
-            if one.reading is not None:
-                entry = self._written(self.session.judged(one.reading))
-            elif one.left is not None:
+            incoming = self._coming.popleft()
+            if incoming.reading is not None:
+                entry = self._written(self.session.judged(incoming.reading))
+            elif incoming.left is not None:
                 try:
-                    entry = self._written(self.session.leave_out(*one.left))
+                    entry = self._written(self.session.leave_out(*incoming.left))
                 except InputError as error:
-                    one.refuse(str(error))
+                    incoming.refuse(str(error))
                     continue
-            one.reply(entry)
+            incoming.reply(entry)
             taken.append(entry)
         return tuple(taken)
 
@@ -136,9 +136,9 @@ NO_NESTS: Final = Rule("no-nests", "note", "no nests were measured", cure="Name 
 def session_notices(session: Session) -> list[Notice]:
     """Return what to know about how a plan was measured: nothing of it asks how well a reading fits."""
     readings = [entry for entry in session.entries if entry.reading is not None]
-    found = []
+    notices = []
     if back := _gone_back(readings):
-        found.append(
+        notices.append(
             CLOCK_BACK(
                 f"The clock went back before {_numbers(back)}. The order is that in which readings came; the drift of "
                 "nests over time may be wrong."
@@ -146,7 +146,7 @@ def session_notices(session: Session) -> list[Notice]:
         )
     none = len(session.without_reading)
     if 2 * none > len(session.labels):
-        found.append(
+        notices.append(
             MANY_LEFT_OUT(
                 f"At {none} of {len(session.labels)} configurations every target was left out: "
                 f"{len(session.left_out)} of {session.planned} readings of targets are "
@@ -155,30 +155,30 @@ def session_notices(session: Session) -> list[Notice]:
         )
     jumps = _out_of_order(session)
     if jumps:
-        found.append(
+        notices.append(
             OTHER_ORDER(f"Not measured in the order of the plan: {_some(jumps)}. The file says in which order it was.")
         )
-    kept = [entry for entry in session.kept if entry.reading is not None]
-    blind = sum(session.quality.unasked(entry.reading) for entry in kept if entry.reading is not None)
+    entries = [entry for entry in session.kept if entry.reading is not None]
+    blind = sum(session.quality.unasked(entry.reading) for entry in entries if entry.reading is not None)
     if blind:
-        found.append(
+        notices.append(
             NOT_JUDGED(
-                f"Of {blind} of {len(kept)} readings that are kept nothing says how they were taken, or no limit was "
-                "given: scatter, settling and samples of the dwell were not judged."
+                f"Of {blind} of {len(entries)} readings that are kept nothing says how they were taken, or no limit "
+                "was given: scatter, settling and samples of the dwell were not judged."
             )
         )
     if session.missed_rounds:
-        found.append(
+        notices.append(
             NESTS_MISSED(
                 f"In {session.missed_rounds} of {session.rounds} rounds not all nests were measured: what moved in "
                 f"between is not known as well.{_hidden(session)}"
             )
         )
     if readings and not session.nests:
-        found.append(
+        notices.append(
             NO_NESTS("No fixed nests were measured along the way: nobody can tell whether instrument or robot moved.")
         )
-    return found
+    return notices
 
 
 def _hidden(session: Session) -> str:
@@ -186,8 +186,8 @@ def _hidden(session: Session) -> str:
     left = session.nests_left_out
     if not left:
         return ""
-    said = _some([f"{e.name} at {e.label}{f' ({e.words})' if e.words else ''}" for e in left])
-    return f" Left out: {said}. Put nests where nothing comes between, or measure them at another configuration."
+    names = _some([f"{e.name} at {e.label}{f' ({e.words})' if e.words else ''}" for e in left])
+    return f" Left out: {names}. Put nests where nothing comes between, or measure them at another configuration."
 
 
 def _gone_back(entries: Sequence[Entry]) -> list[int]:
@@ -207,8 +207,8 @@ def _numbers(numbers: Sequence[int]) -> str:
 
 
 def _some(names: Sequence[str]) -> str:
-    rest = len(names) - _NAMED
-    return f"{', '.join(names[:_NAMED])}{f' and {rest} more' if rest > 0 else ''}"
+    more = len(names) - _NAMED
+    return f"{', '.join(names[:_NAMED])}{f' and {more} more' if more > 0 else ''}"
 
 
 #: Fewer degrees of freedom say too little of a standard deviation.
@@ -279,19 +279,19 @@ class NestDrift:
 
 def nest_drift(session: Session) -> NestDrift | None:
     """Return how the nests moved, by the readings that are kept; None before one was read."""
-    kept = [entry for entry in session.kept if entry.is_nest and entry.reading is not None]
-    if not kept:
+    entries = [entry for entry in session.kept if entry.is_nest and entry.reading is not None]
+    if not entries:
         return None
-    names = tuple(name for name in session.nests if any(entry.name == name for entry in kept))
-    rounds = tuple(sorted({session.round_of(entry) for entry in kept}))
+    names = tuple(name for name in session.nests if any(entry.name == name for entry in entries))
+    rounds = tuple(sorted({session.round_of(entry) for entry in entries}))
     place = np.full((len(names), len(rounds), 3), np.nan)
     time = np.full((len(names), len(rounds)), np.nan)
-    for entry in kept:
+    for entry in entries:
         if entry.reading is not None:
             at = names.index(entry.name), rounds.index(session.round_of(entry))
             place[at], time[at] = entry.reading.position, entry.reading.time
     times = np.nanmean(time, axis=0)
-    first = np.array([one[np.isfinite(one[:, 0])][0] for one in place])
+    first = np.array([row[np.isfinite(row[:, 0])][0] for row in place])
     read = np.isfinite(place[:, :, 0])
     freedoms = 3 * int((read.sum(axis=1) - 1).sum())
     about = place - np.nanmean(place, axis=1, keepdims=True)

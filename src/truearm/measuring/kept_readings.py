@@ -63,12 +63,12 @@ def kept_readings(
     index = {session.labels.index(label): number for number, label in enumerate(visits.order)}
     places = [*index]
     names = [name for name in session.targets if any(entry.name == name for entry in targets)]
-    found = {(entry.label, entry.name): entry for entry in targets}
+    entries = {(entry.label, entry.name): entry for entry in targets}
     asked = dict(zip(session.labels, session.asked, strict=True))
     rows = []
     for label in visits.order:  # what nobody asked for is not missing
-        of = [name for name in names if name in asked[label] or (label, name) in found]
-        rows += [(label, name, found.get((label, name))) for name in of or names]
+        of = [name for name in names if name in asked[label] or (label, name) in entries]
+        rows += [(label, name, entries.get((label, name))) for name in of or names]
     sigma = stated_sigma(session)
     common: dict[str, Any] = {
         "source": source,
@@ -130,8 +130,8 @@ def _fields(rows: list[tuple[str, str, Entry | None]], visits: _Visits, sigma: S
 
     def each(name: str, width: int) -> Array:
         missing = np.full(width, np.nan)
-        found = [None if reading is None else getattr(reading, name) for reading in readings]
-        return np.array([missing if value is None else np.reshape(value, width) for value in found], float)
+        values = [None if reading is None else getattr(reading, name) for reading in readings]
+        return np.array([missing if value is None else np.reshape(value, width) for value in values], float)
 
     turned = any(reading is not None and reading.quaternion is not None for reading in readings)
     deviations: dict[str, Array | None] = {"sigma": None, "sigma_rot": None}

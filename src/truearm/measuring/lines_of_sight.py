@@ -41,15 +41,15 @@ def extent_notices(session: Session, flange: Array) -> list[Notice]:
     """
     places = {label: number for number, label in enumerate(session.labels)}
     for name in session.targets:
-        kept = [e for e in session.kept if e.name == name and e.reading is not None]
-        if len(kept) < _FEWEST:
+        entries = [e for e in session.kept if e.name == name and e.reading is not None]
+        if len(entries) < _FEWEST:
             continue
-        read = _extent(np.array([e.reading.position for e in kept if e.reading is not None]))
-        driven = _extent(flange[[places[e.label] for e in kept]])
+        read = _extent(np.array([e.reading.position for e in entries if e.reading is not None]))
+        driven = _extent(flange[[places[e.label] for e in entries]])
         if driven and not 1.0 / _TIMES < read / driven < _TIMES:
             return [
                 UNITS_UNLIKELY(
-                    f"The readings of {name} at {len(kept)} configurations are {read * 1e3:.4g} mm apart, root mean "
+                    f"The readings of {name} at {len(entries)} configurations are {read * 1e3:.4g} mm apart, root mean "
                     f"square about their middle, and the flange of the robot {driven * 1e3:.4g} mm."
                 )
             ]
@@ -125,7 +125,7 @@ def hidden(
     """
     base, arm = robot.base, ArmCapsules(robot)
     at = arm.points(joints)
-    found: list[dict[str, str]] = [{} for _ in joints]
+    reasons: list[dict[str, str]] = [{} for _ in joints]
 
     def in_base(point: Array) -> Array:
         return np.asarray((point - np.array(base.translation)) @ base.rotation)[:, None]
@@ -137,7 +137,7 @@ def hidden(
         near = np.zeros(len(joints), dtype=bool)
         for link in (*arm.links, *arm.tools):
             near |= segment_distance(at[link.start], at[link.end], start, end) < link.radius + BEAM
-        for k, one in enumerate(found):
+        for k, by_target in enumerate(reasons):
             if behind or near[k]:
-                one[name] = f"the box {behind[0]!r}" if behind else "the arm"
-    return found
+                by_target[name] = f"the box {behind[0]!r}" if behind else "the arm"
+    return reasons

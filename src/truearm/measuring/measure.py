@@ -20,7 +20,7 @@ from truearm.engine.command.groups import (
     Repeatable,
     SeenBy,
 )
-from truearm.engine.command.kinds import File, Names, Number, Text, Told, Whole
+from truearm.engine.command.kinds import Callback, File, Names, Number, Text, Whole
 from truearm.engine.command.request import as_in, job, option, required
 
 if TYPE_CHECKING:
@@ -53,20 +53,20 @@ class _Points(Names):
 
     def check(self, value: Any, name: str) -> Any:
         """Refuse what are no names, or one twice."""
-        found = super().check(value, name)
-        given = [str(one) for one in value]
-        if len(given) > len(found):
-            twice = next(one for one in found if given.count(one) > 1)
+        names = super().check(value, name)
+        typed = [str(text) for text in value]
+        if len(typed) > len(names):
+            twice = next(text for text in names if typed.count(text) > 1)
             raise InputError("a point is named twice", parameter=name, came=twice, cure="Name each once.")
-        for one in found:
-            if not is_one_line(one) or len(one) > _LONGEST_NAME or one != one.strip():
+        for point in names:
+            if not is_one_line(point) or len(point) > _LONGEST_NAME or point != point.strip():
                 raise InputError(
                     "a name belongs here",
                     parameter=name,
-                    came=one,
+                    came=point,
                     allowed=f"one line of up to {_LONGEST_NAME} characters",
                 )
-        return found
+        return names
 
 
 class _Folder(File):
@@ -215,7 +215,7 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
         more="None waits until all is measured, or Ctrl-C.",
     )
     tell: Callable[[str], None] = option(
-        Told(),
+        Callback(),
         "Called with a line for each reading, and for what could not be read",
         default=_silent,
         word="",
@@ -229,22 +229,24 @@ class Measure(OfRobot, OfPlan, Carrying, Repeatable, Long):
 
     def check(self) -> None:
         """Refuse no source or several, and what belongs to another one."""
-        given = [source for source in _OF if getattr(self, source) is not None]
+        sources = [source for source in _OF if getattr(self, source) is not None]
         belonging = [(of, name) for of, names in _OF.items() for name in names if getattr(self, name) is not None]
-        if belonging and not given:
+        if belonging and not sources:
             of, name = belonging[0]
             raise InputError(f"no {_CALLED[of]} is given, and `{name}` belongs to one", parameter=of, cure="Name it.")
-        if len(given) != 1:
+        if len(sources) != 1:
             raise InputError(
-                "readings come from one source" if given else "nobody says where readings come from",
-                parameter=", ".join(given) or "device, watch, listen",
+                "readings come from one source" if sources else "nobody says where readings come from",
+                parameter=", ".join(sources) or "device, watch, listen",
                 allowed="a virtual device, a folder to watch, or a port to listen on",
-                cure="Keep one of them." if given else "Give one of them.",
+                cure="Keep one of them." if sources else "Give one of them.",
             )
         for of, name in belonging:
-            if of != given[0]:
+            if of != sources[0]:
                 raise InputError(
-                    f"this belongs to `{of}`, and readings come from `{given[0]}`", parameter=name, cure="Leave it out."
+                    f"this belongs to `{of}`, and readings come from `{sources[0]}`",
+                    parameter=name,
+                    cure="Leave it out.",
                 )
 
     def run(self) -> Measured:

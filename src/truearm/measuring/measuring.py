@@ -23,7 +23,7 @@ _TURN: Final = 0.5
 def measured(asked: Measure) -> Measured:
     """Take one reading after the other until all are there, or somebody stops."""
     with opened(asked) as campaign:
-        _begun(campaign, asked.tell, told_token=asked.token is None)
+        _begun(campaign, asked.tell, with_token=asked.token is None)
         with _stopped_by_hand() as stopped:
             last = time.monotonic()
             while not campaign.session.done and not stopped():
@@ -33,7 +33,7 @@ def measured(asked: Measure) -> Measured:
                     asked.progress(words)
                 left = _TURN if asked.timeout is None else asked.timeout - (time.monotonic() - last)
                 entries = campaign.step(max(0.0, min(_TURN, left)))
-                for line in campaign.source.told():
+                for line in campaign.source.messages():
                     asked.tell(line)
                 for entry in entries:
                     asked.tell(entry.line())
@@ -45,15 +45,15 @@ def measured(asked: Measure) -> Measured:
         return campaign.finish()
 
 
-def _begun(campaign: OpenCampaign, tell: Callable[[str], None], *, told_token: bool) -> None:
+def _begun(campaign: OpenCampaign, tell: Callable[[str], None], *, with_token: bool) -> None:
     from truearm.measuring.sources import HOST, Listener
 
     session = campaign.session
     if campaign.before:
         tell(f"Going on after {campaign.before} entries of the log: {session.outstanding} readings are still to come.")
     if isinstance(campaign.source, Listener):
-        said = f", token {campaign.source.token}" if told_token else ""
-        tell(f"Listening on {HOST} port {campaign.source.port}{said}")
+        token = f", token {campaign.source.token}" if with_token else ""
+        tell(f"Listening on {HOST} port {campaign.source.port}{token}")
 
 
 @contextmanager

@@ -71,21 +71,21 @@ class OpenCampaign(Campaign):
         robot: Robot,
         placed: Robot | None,
         plan: _Plan,
-        said: _Said,
+        stated: _Stated,
         sighted: tuple[Notice, ...],
     ) -> None:
         super().__init__(session, source, folder)
         self.robot, self.placed, self.joints, self.sighted = robot, placed, plan.joints, sighted
-        self._plan, self._said, self._folder = plan, said, folder
+        self._plan, self._stated, self._folder = plan, stated, folder
         self._flange = robot.world_poses(plan.joints)[0]
 
     @property
     def notices(self) -> tuple[Notice, ...]:
         """What to know so far: what cannot be read, whether lengths can be meant, and how it was measured."""
-        told = super().notices
-        if any(one.level == "warning" for one in self.sighted):  # it says what that one would say again
-            told = tuple(one for one in told if one.code != "many-left-out")
-        return (*self.sighted, *extent_notices(self.session, self._flange), *told)
+        notices = super().notices
+        if any(notice.level == "warning" for notice in self.sighted):  # it says what that one would say again
+            notices = tuple(notice for notice in notices if notice.code != "many-left-out")
+        return (*self.sighted, *extent_notices(self.session, self._flange), *notices)
 
     def measured(self) -> Measured:
         """Return what has come of it so far."""
@@ -94,11 +94,11 @@ class OpenCampaign(Campaign):
             plan=str(self._plan.path),
             session=self.session,
             configurations=self._plan.configurations,
-            about=self._said.about,
-            instrument=self._said.instrument,
+            about=self._stated.about,
+            instrument=self._stated.instrument,
             folder=self._folder,
-            command=self._said.command,
-            told=self.notices,
+            command=self._stated.command,
+            measuring_notices=self.notices,
             simulated=self.placed is not None,
         )
 
@@ -139,7 +139,7 @@ class _Plan:
 
 
 @dataclass(frozen=True)
-class _Said:
+class _Stated:
     about: About
     instrument: str
     command: str
@@ -183,7 +183,7 @@ def opened(asked: Measure) -> OpenCampaign:
             robot=nominal,
             placed=None if virtual is None else virtual.placed,
             plan=planned,
-            said=_Said(about, of.instrument, asked.again),
+            stated=_Stated(about, of.instrument, asked.again),
             sighted=sighted,
         )
     except BaseException:
@@ -255,33 +255,33 @@ def sight(campaign: OpenCampaign) -> Sight | None:
 
 def _planned(path: Path, robot: Robot) -> _Plan:
     """Return the configurations of a plan, and their joint positions as the model counts them."""
-    cells, found = joints_in_file(path)
-    n = len(found.labels)
-    if n < len(found.of_row):
+    cells, joints = joints_in_file(path)
+    n = len(joints.labels)
+    if n < len(joints.of_row):
         raise InputError(
             "a configuration of the plan appears twice",
             where=cells.source,
-            came=found.labels[int(np.argmax(np.bincount(found.of_row)))],
+            came=joints.labels[int(np.argmax(np.bincount(joints.of_row)))],
             cure="Give every row its own label: one row is one standstill.",
         )
     data = Dataset(
         source=cells.source,
-        labels=found.labels,
-        joints=found.joints,
-        joint_kinds=found.kinds,
+        labels=joints.labels,
+        joints=joints.joints,
+        joint_kinds=joints.kinds,
         targets=("any",),
         configuration=np.arange(n),
         target=np.zeros(n, dtype=np.intp),
         position=np.full((n, 3), np.nan),
-        joints_are=found.joints_are,
+        joints_are=joints.joints_are,
     )
     at = cells.names.index(_READS) if _READS in cells.names else None
     reads = () if at is None else cells.columns[at]
-    stops = found.before
+    stops = joints.before
     before = None if stops is None else replace(data, joints=stops.joints, joint_kinds=stops.kinds)
     return _Plan(
         path,
-        found,
+        joints,
         in_model_joints(robot, data).joints,
         reads,
         None if before is None else in_model_joints(robot, before).joints,

@@ -124,7 +124,7 @@ class About:
     @property
     def missing(self) -> list[str]:
         """What nobody said."""
-        said = {
+        values = {
             "serial number of the instrument": self.instrument_serial,
             "serial number of the robot": self.robot_serial,
             "radius of the reflector": self.reflector_radius,
@@ -134,7 +134,7 @@ class About:
                 for name in _AIR
             },
         }
-        return [name for name, value in said.items() if value is None]
+        return [name for name, value in values.items() if value is None]
 
     @property
     def fixed(self) -> dict[str, Any]:
@@ -148,7 +148,7 @@ class About:
 
     def rows(self) -> list[tuple[str, str]]:
         """Return it as a table of names and values with their units."""
-        found = [
+        rows = [
             ("instrument", self.instrument or "not said"),
             ("serial number of the instrument", self.instrument_serial or "not said"),
             ("serial number of the robot", self.robot_serial or "not said"),
@@ -156,9 +156,9 @@ class About:
             ("offset of the reflector", _millimetres(self.reflector_offset)),
         ]
         for air in self.environment:
-            said = [f"{value:g} {_AIR[name][2]}" for name in _AIR if (value := getattr(air, name)) is not None]
-            found.append((f"air, {air.at}", ", ".join(said) or "not said"))
-        return found if self.environment else [*found, ("air", "not said")]
+            figures = [f"{value:g} {_AIR[name][2]}" for name in _AIR if (value := getattr(air, name)) is not None]
+            rows.append((f"air, {air.at}", ", ".join(figures) or "not said"))
+        return rows if self.environment else [*rows, ("air", "not said")]
 
     def notices(self) -> list[Notice]:
         """Name what nobody said."""
@@ -250,6 +250,7 @@ _COLUMNS: Final = (
 )
 _HEADER: Final = ",".join(_COLUMNS)
 _ROLES: Final = ("target", "nest")
+_NOT_EDITED: Final = "A log is not edited: put back the file as it was, or begin in another folder."
 _EVENTS: Final = ("reading", "aside", "left")
 
 
@@ -324,7 +325,7 @@ class ReadingLog:
 
     def _read(self, content: bytes) -> tuple[int, tuple[Entry, ...]]:
         """Return how many bytes at the end are a part of a line, and the entries of the lines before."""
-        whole, _, rest = content.rpartition(b"\n")
+        whole, _, partial = content.rpartition(b"\n")
         header, *lines = whole.split(b"\n") if whole else [_HEADER.encode()]
         if header != _HEADER.encode():
             raise InputError("this is no log of readings", where=f"{self.path}, line 1", cure="Choose another `out`.")
@@ -334,10 +335,19 @@ class ReadingLog:
             raise InputError(
                 "this line is not as it was written",
                 where=f"{self.path}, line {bad}",
-                cure="A log is not edited: put back the file as it was, or begin in another folder.",
+                cure=_NOT_EDITED,
             )
         entries = tuple(self._entry(str(text), number) for number, text in enumerate(texts, 2))
-        return len(rest), entries
+        for number, entry in enumerate(entries, 1):
+            if entry.number != number:
+                raise InputError(
+                    "lines before this one are missing, or stand there twice",
+                    where=f"{self.path}, line {number + 1}",
+                    came=f"number {entry.number}",
+                    allowed=f"number {number}",
+                    cure=_NOT_EDITED,
+                )
+        return len(partial), entries
 
     def _entry(self, text: str, number: int) -> Entry:
         try:

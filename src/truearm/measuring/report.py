@@ -43,8 +43,8 @@ def quality_figure(session: Session) -> Figure | None:
         return None
     number = np.arange(1, len(drawn.names) + 1)
     traces = []
-    for kept, name, colour, symbol in ((True, "kept", AFTER, "circle"), (False, "set aside", COLOURS[0], "x")):
-        chosen = np.flatnonzero(known & (drawn.kept == kept))
+    for is_kept, name, colour, symbol in ((True, "kept", AFTER, "circle"), (False, "set aside", COLOURS[0], "x")):
+        chosen = np.flatnonzero(known & (drawn.kept == is_kept))
         if len(chosen):
             words = [
                 html.escape(f"{drawn.labels[k]} {drawn.names[k]}{f', {drawn.reasons[k]}' if drawn.reasons[k] else ''}")
@@ -95,8 +95,8 @@ def measure_report(measured: Measured) -> str:
     """Return the page."""
     session, quality = measured.session, measured.session.quality
     counts = session.aside_by_reason
-    kept = len(session.kept)
-    states = [("kept", str(kept), "")]
+    accepted = len(session.kept)
+    states = [("kept", str(accepted), "")]
     states += [(reason, str(count), REASONS[reason]) for reason, count in counts.items()]
     asked = [
         (

@@ -49,7 +49,7 @@ class Measured(Record):
     instrument: str  #: Where the readings came from, in words.
     folder: Path  #: In which the files are.
     command: str  #: How to go on, or to write the files again.
-    told: tuple[Notice, ...] = ()  #: What to know about how it was measured.
+    measuring_notices: tuple[Notice, ...] = ()  #: What to know about how it was measured.
     simulated: bool = False  #: Whether a virtual instrument reads.
 
     @property
@@ -80,7 +80,7 @@ class Measured(Record):
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """What to know about the measurements."""
-        return (*self._unfinished(), *self._moved(), *self.told, *self.about.notices())
+        return (*self._unfinished(), *self._moved(), *self.measuring_notices, *self.about.notices())
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -103,14 +103,14 @@ class Measured(Record):
         """Give what is kept, what is not and why, how the nests moved, and the standard deviation, in mm."""
         session = self.session
         measured = len({entry.label for entry in session.kept if not entry.is_nest})
-        kept = sum(not entry.is_nest for entry in session.kept)
+        accepted = sum(not entry.is_nest for entry in session.kept)
         yield say(
             f"{measured} of {counted(len(session.labels), 'configuration')} measured, "
-            f"{counted(kept, 'reading')} of {counted(len(session.targets), 'target')} kept.",
+            f"{counted(accepted, 'reading')} of {counted(len(session.targets), 'target')} kept.",
             finished=self.finished,
             configurations={"measured": measured, "planned": len(session.labels)},
             targets=list(session.targets),
-            kept={"targets": kept, "nests": len(session.kept) - kept},
+            kept={"targets": accepted, "nests": len(session.kept) - accepted},
             outstanding=session.outstanding,
             files=list(self.files),
         )
@@ -126,7 +126,7 @@ class Measured(Record):
         size = None if self.sigma.value is None else self.sigma.value * 1e3
         shown = "" if size is None else f"{size:.4f} mm, "
         yield detail(
-            *([f"Standard deviation in the file: {shown}{self.sigma.words}."] if kept else []),
+            *([f"Standard deviation in the file: {shown}{self.sigma.words}."] if accepted else []),
             sigma_mm=size,
             sigma_from=self.sigma.words,
             about={**self.about.fixed, "environment": [air.__dict__ for air in self.about.environment]},
@@ -134,15 +134,15 @@ class Measured(Record):
 
     def _nests(self, drift: NestDrift) -> Words:
         together, sigma = self._together(drift) * 1e3, None if drift.sigma is None else drift.sigma * 1e3
-        how = "whether they move shows from the second round on"
+        movement = "whether they move shows from the second round on"
         if len(drift.rounds) > 1:
             repeat = "" if sigma is None else f"; they repeat to {sigma:.4f} mm in a coordinate"
-            how = (
+            movement = (
                 f"moved by up to {drift.largest * 1e3:.4f} mm, together by up to {together:.4f} mm{repeat}. No reading "
                 "is corrected for it"
             )
         return say(
-            f"Nests {listed(drift.names)} in {counted(len(drift.rounds), 'round')}: {how}.",
+            f"Nests {listed(drift.names)} in {counted(len(drift.rounds), 'round')}: {movement}.",
             names=list(drift.names),
             rounds=len(drift.rounds),
             largest_mm=drift.largest * 1e3,
@@ -181,5 +181,5 @@ class Measured(Record):
         ]
 
     def _stated(self) -> float:
-        found = [e.reading.sigma for e in self.session.kept if e.reading is not None and e.reading.sigma is not None]
-        return math.sqrt(sum(value**2 for value in found) / len(found)) if found else 0.0
+        sigmas = [e.reading.sigma for e in self.session.kept if e.reading is not None and e.reading.sigma is not None]
+        return math.sqrt(sum(value**2 for value in sigmas) / len(sigmas)) if sigmas else 0.0

@@ -101,12 +101,12 @@ class Quality:
             return "beam-break", f"{reading.breaks} times" if reading.breaks > 1 else ""
         if reading.samples is not None and reading.samples < self.samples:
             return "few-samples", f"{reading.samples}, {self.samples} or more are needed"
-        for reason, came, most in (
+        for reason, value, most in (
             ("scatter", reading.deviation, self.deviation),
             ("not-settled", reading.settling, self.settling),
         ):
-            if came is not None and most is not None and came > most:
-                return reason, f"{came * 1e3:.4f} mm, up to {most * 1e3:.4f} mm is allowed"
+            if value is not None and most is not None and value > most:
+                return reason, f"{value * 1e3:.4f} mm, up to {most * 1e3:.4f} mm is allowed"
         return "", ""
 
     def unasked(self, reading: Reading) -> bool:
@@ -116,7 +116,7 @@ class Quality:
             (reading.deviation, self.deviation),
             (reading.settling, self.settling),
         )
-        return not any(came is not None and most is not None for came, most in asked)
+        return not any(value is not None and most is not None for value, most in asked)
 
 
 Event = Literal["reading", "aside", "left"]
@@ -153,9 +153,9 @@ class Entry:
 
     def line(self) -> str:
         """Return it as one line of text."""
-        what = f"{self.number:4d}  {self.label or '?'} {self.name}"
+        head = f"{self.number:4d}  {self.label or '?'} {self.name}"
         if self.event == "aside":
-            return f"{what}: reading {self.of} set aside by the operator" + (f" ({self.words})" if self.words else "")
+            return f"{head}: reading {self.of} set aside by the operator" + (f" ({self.words})" if self.words else "")
         figures = ""
         reading = self.reading
         if reading is not None and not reading.is_empty:
@@ -164,9 +164,9 @@ class Entry:
             if reading.deviation is not None:
                 figures += f"  deviation {reading.deviation * 1e3:.4f} mm"
         if not self.reason:
-            return f"{what}{figures}"
-        said = f"{REASONS[self.reason]}{f': {self.words}' if self.words else ''}"
-        return f"{what}{figures}  {'left out' if self.event == 'left' else 'set aside'}: {said}"
+            return f"{head}{figures}"
+        reason = f"{REASONS[self.reason]}{f': {self.words}' if self.words else ''}"
+        return f"{head}{figures}  {'left out' if self.event == 'left' else 'set aside'}: {reason}"
 
 
 @dataclass(frozen=True)
@@ -281,9 +281,9 @@ class Session:
     @property
     def next(self) -> Step | None:
         """What is to be measured now; None if nothing is left."""
-        here = self._open("configuration", self._at) if self._at is not None else ()
-        if here and self._at is not None:
-            return self._step("configuration", self._at, here)
+        targets = self._open("configuration", self._at) if self._at is not None else ()
+        if targets and self._at is not None:
+            return self._step("configuration", self._at, targets)
         if nests := self._open("nests", self._round):
             return self._step("nests", self._standing, nests)
         k = self._first_open()
@@ -336,17 +336,17 @@ class Session:
         """Return all readings as arrays."""
         entries = [entry for entry in self._entries if entry.reading is not None]
         readings = [entry.reading for entry in entries if entry.reading is not None]
-        held = {*self._held.values()}
+        accepted = {*self._held.values()}
 
         def figures(name: str) -> Array:
-            found = [getattr(reading, name) for reading in readings]
-            return np.array([np.nan if value is None else value for value in found], float)
+            values = [getattr(reading, name) for reading in readings]
+            return np.array([np.nan if value is None else value for value in values], float)
 
         return Drawn(
             names=tuple(entry.name for entry in entries),
             labels=tuple(entry.label for entry in entries),
             is_nest=np.array([entry.is_nest for entry in entries], bool),
-            kept=np.array([entry.number in held for entry in entries], bool),
+            kept=np.array([entry.number in accepted for entry in entries], bool),
             reasons=tuple(self.reason_of(entry) for entry in entries),
             time=figures("time"),
             position=np.array([reading.position for reading in readings]).reshape(-1, 3),
@@ -408,8 +408,9 @@ class Session:
             InputError: If an entry does not follow from those before: the log was changed.
         """
         for entry in entries:
-            place = self._place_in_log(entry)
-            if entry.number != len(self) + 1 or not self._follows(entry, place):
+            in_turn = entry.number == len(self) + 1
+            place = self._place_in_log(entry) if in_turn else None
+            if not in_turn or not self._follows(entry, place):
                 raise InputError("this does not follow from what stands before it", where=f"number {entry.number}")
             self._entries.append(entry)
             self._places.append(place)

@@ -54,7 +54,7 @@ class Source(Protocol):
     def poll(self, session: Session, seconds: float) -> list[Incoming]:
         """Return what has come, or comes within some time."""
 
-    def told(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Return what is to be said of what could not be read, once each."""
 
     def close(self) -> None:
@@ -72,7 +72,7 @@ MOST_LINES: Final = 50
 PATIENCE: Final = 5.0
 _WORDS: Final = 200
 #: So much is told at once; more is counted alone.
-_MOST_SAID: Final = 20
+_MOST_MESSAGES: Final = 20
 _KEYS: Final = ("at", "time", "sigma", "samples", "deviation", "settling", "breaks", "q")
 
 
@@ -81,15 +81,18 @@ class _Client:
     stream: socket.socket
     since: float
     known: bool = False
-    rest: bytes = b""
-    room: float = float(MOST_LINES)
+    unread: bytes = b""
+    allowance: float = float(MOST_LINES)
     refilled: float = 0.0
     lines: int = 0
 
 
-WRONG_TOKENS: Final = Rule("wrong-tokens", "warning", "connections without the right token")
-LINES_REFUSED: Final = Rule("lines-refused", "warning", "lines that could not be taken")
-CUT_OFF: Final = Rule("cut-off", "warning", "connections that sent too much, or were too many")
+LINES_REFUSED: Final = Rule(
+    "lines-refused",
+    "warning",
+    "lines that could not be taken, and connections that were ended: without the right token, too many, or with too "
+    "much at once. Each was answered by a line that says why",
+)
 
 
 # Readings sent by a program of this machine, a line each, over TCP.
@@ -111,7 +114,7 @@ class Listener:
     Args:
         port: To listen on; 0 for any that is free.
         token: What a program must send first; a new one if None.
-        now: What time it is [s].
+        clock: What time it is [s].
 
     Raises:
         InputError: If another program listens on the port; a free one is named.
@@ -119,15 +122,15 @@ class Listener:
 
     kind: Final = "listen"
 
-    def __init__(self, port: int, token: str | None = None, now: Callable[[], float] = time.time) -> None:
+    def __init__(self, port: int, token: str | None = None, clock: Callable[[], float] = time.time) -> None:
         self.token = secrets.token_urlsafe(24) if token is None else token
-        self._now = now
+        self._clock = clock
         self._bound = _listening_socket(port)
         self.port: int = self._bound.getsockname()[1]
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._bound, selectors.EVENT_READ)
         self._clients: dict[int, _Client] = {}
-        self._said: list[str] = []
+        self._messages: list[str] = []
         self._wrong_tokens = self._refused = self._cut_off = 0
         self._session: Session | None = None
 
@@ -139,24 +142,24 @@ class Listener:
     @property
     def notices(self) -> tuple[Notice, ...]:
         """What was refused."""
-        found = []
+        notices = []
         if self._wrong_tokens:
-            found.append(
-                WRONG_TOKENS(
+            notices.append(
+                LINES_REFUSED(
                     f"{counted(self._wrong_tokens, 'connection')} without the right token "
                     f"{'was' if self._wrong_tokens == 1 else 'were'} refused."
                 )
             )
         if self._refused:
-            found.append(LINES_REFUSED(f"{counted(self._refused, 'line')} that came could not be taken."))
+            notices.append(LINES_REFUSED(f"{counted(self._refused, 'line')} that came could not be taken."))
         if self._cut_off:
-            found.append(
-                CUT_OFF(
+            notices.append(
+                LINES_REFUSED(
                     f"{counted(self._cut_off, 'connection')} sent too much at once, or connected beside too many "
                     "others, and was cut off."
                 )
             )
-        return tuple(found)
+        return tuple(notices)
 
     def poll(self, session: Session, seconds: float) -> list[Incoming]:
         """Return what connected programs send, waiting for the first line at most some time."""
@@ -173,10 +176,10 @@ class Listener:
             if incomings or time.monotonic() >= until:
                 return incomings
 
-    def told(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Return what was refused since it was asked last."""
-        said, self._said = self._said, []
-        return said
+        messages, self._messages = self._messages, []
+        return messages
 
     def close(self) -> None:
         """End all connections and free the port."""
@@ -186,8 +189,8 @@ class Listener:
         self._bound.close()
 
     def _tell(self, words: str) -> None:
-        if len(self._said) < _MOST_SAID:
-            self._said.append(words)
+        if len(self._messages) < _MOST_MESSAGES:
+            self._messages.append(words)
 
     def _accept(self) -> None:
         try:
@@ -214,24 +217,24 @@ class Listener:
         if not content:
             self._end(client)
             return []
-        *lines, client.rest = (client.rest + content).split(b"\n")
+        *lines, client.unread = (client.unread + content).split(b"\n")
         incomings: list[Incoming] = []
         for line in lines:
             if client.stream.fileno() < 0:
                 break
-            if len(line) > LONGEST_LINE or not self._has_room(client):
+            if len(line) > LONGEST_LINE or not self._may_send(client):
                 self._cut(client)
                 break
             incomings += self._line(client, line)
-        if len(client.rest) > LONGEST_LINE and client.stream.fileno() >= 0:
+        if len(client.unread) > LONGEST_LINE and client.stream.fileno() >= 0:
             self._cut(client)
         return incomings
 
-    def _has_room(self, client: _Client) -> bool:
-        now = time.monotonic()
-        client.room = min(float(MOST_LINES), client.room + (now - client.refilled) * MOST_LINES) - 1.0
-        client.refilled = now
-        return client.room >= 0.0
+    def _may_send(self, client: _Client) -> bool:
+        instant = time.monotonic()
+        client.allowance = min(float(MOST_LINES), client.allowance + (instant - client.refilled) * MOST_LINES) - 1.0
+        client.refilled = instant
+        return client.allowance >= 0.0
 
     def _line(self, client: _Client, line: bytes) -> list[Incoming]:
         try:
@@ -250,8 +253,8 @@ class Listener:
             return []
 
     def _greeted(self, client: _Client, words: list[str]) -> list[Incoming]:
-        given = words[1] if len(words) == 2 and words[0] == "token" else ""
-        if hmac.compare_digest(given.encode("utf-8", "surrogatepass"), self.token.encode()):
+        token = words[1] if len(words) == 2 and words[0] == "token" else ""
+        if hmac.compare_digest(token.encode("utf-8", "surrogatepass"), self.token.encode()):
             client.known = True
             self._answer(client, f"ok{self._what_next()}")
             return []
@@ -267,8 +270,8 @@ class Listener:
             kind = entry.event if entry.event != "reading" else "aside" if entry.reason else "kept"
             self._answer(client, f"{kind} {entry.number}{about}{self._what_next()}")
 
-        def refuse(said: str) -> None:
-            self._refuse(client, said)
+        def refuse(message: str) -> None:
+            self._refuse(client, message)
 
         if words[0] == "left":
             if len(words) < 3:
@@ -276,16 +279,16 @@ class Listener:
             return Incoming(left=(words[1], words[2], " ".join(words[3:])), reply=reply, refuse=refuse)
         if words[0] != "reading":
             raise InputError("there is no such line", came=words[0], allowed="reading, left")
-        return Incoming(_reading(words, self._now(), f"port {self.port}"), reply=reply, refuse=refuse)
+        return Incoming(_reading(words, self._clock(), f"port {self.port}"), reply=reply, refuse=refuse)
 
     def _what_next(self) -> str:
         step = None if self._session is None else self._session.next
         return "; nothing is left" if step is None else f"; next {shlex.quote(step.label)} {shlex.quote(step.names[0])}"
 
-    def _refuse(self, client: _Client, said: str) -> None:
+    def _refuse(self, client: _Client, message: str) -> None:
         self._refused += 1
-        self._tell(f"a line was refused: {said}")
-        self._answer(client, f"refused {said}")
+        self._tell(f"a line was refused: {message}")
+        self._answer(client, f"refused {message}")
 
     def _answer(self, client: _Client, text: str) -> None:
         if client.stream.fileno() >= 0 and not _send(client.stream, text):
@@ -310,47 +313,47 @@ class Listener:
             client.stream.close()
 
 
-def _reading(words: list[str], now: float, origin: str) -> Reading:
+def _reading(words: list[str], received: float, origin: str) -> Reading:
     """Return the reading of a line, or refuse it."""
     if len(words) < 6:
         raise InputError("a reading has a name, three coordinates and their unit", came=" ".join(words[:6]))
     name, unit = words[1], words[5]
     if unit not in LENGTH_UNITS:
         raise InputError("there is no such unit of length", came=unit, allowed=", ".join(LENGTH_UNITS))
-    given: dict[str, str] = {}
+    fields: dict[str, str] = {}
     for word in words[6:]:
         key, _, value = word.partition("=")
-        if key not in _KEYS or key in given:
+        if key not in _KEYS or key in fields:
             raise InputError("this cannot stand here", came=word, allowed=", ".join(f"{key}=" for key in _KEYS))
-        given[key] = value
+        fields[key] = value
 
     def length(key: str) -> float | None:
-        return None if key not in given else to_si(_number(given[key], key, 0.0), unit)
+        return None if key not in fields else to_si(_number(fields[key], key, 0.0), unit)
 
     def count(key: str) -> int | None:
-        if key not in given:
+        if key not in fields:
             return None
-        if not given[key].isdecimal() or len(given[key]) > 9:
-            raise InputError("a count belongs here", came=f"{key}={given[key]}")
-        return int(given[key])
+        if not fields[key].isdecimal() or len(fields[key]) > 9:
+            raise InputError("a count belongs here", came=f"{key}={fields[key]}")
+        return int(fields[key])
 
     position = np.array([sized_si(_number(word, "coordinates"), unit) for word in words[2:5]])
     quaternion: Any = None
-    if "q" in given:
-        quaternion = np.array([_number(text, "q") for text in given["q"].split(",")])
+    if "q" in fields:
+        quaternion = np.array([_number(text, "q") for text in fields["q"].split(",")])
         norm = float(np.linalg.norm(quaternion))
         if len(quaternion) != 4 or not abs(norm - 1.0) <= QUATERNION_TOLERANCE:
-            raise InputError("a quaternion (w, x, y, z) of length 1 belongs here", came=given["q"])
+            raise InputError("a quaternion (w, x, y, z) of length 1 belongs here", came=fields["q"])
         quaternion = quaternion / norm
     sigma = None
-    if "sigma" in given:
-        sigma = sized_si(_number(given["sigma"], "sigma", 0.0), unit, deviation=True)
+    if "sigma" in fields:
+        sigma = sized_si(_number(fields["sigma"], "sigma", 0.0), unit, deviation=True)
     return Reading(
         name=shortened(printable(name), _WORDS),
-        time=_number(given["time"], "time") if "time" in given else now,
+        time=_number(fields["time"], "time") if "time" in fields else received,
         position=position,
         quaternion=quaternion,
-        label=shortened(printable(given["at"]), _WORDS) if "at" in given else None,
+        label=shortened(printable(fields["at"]), _WORDS) if "at" in fields else None,
         sigma=sigma,
         samples=count("samples"),
         deviation=length("deviation"),
@@ -360,10 +363,10 @@ def _reading(words: list[str], now: float, origin: str) -> Reading:
     )
 
 
-def _number(text: str, what: str, least: float = -math.inf) -> float:
+def _number(text: str, name: str, least: float = -math.inf) -> float:
     number = as_number(text)
     if number is None or not math.isfinite(number) or number < least:
-        raise InputError(f"a number belongs here ({what})", came=text, allowed="0 or more" if least == 0.0 else None)
+        raise InputError(f"a number belongs here ({name})", came=text, allowed="0 or more" if least == 0.0 else None)
     return number
 
 

@@ -112,7 +112,7 @@ class VirtualInstrument:
         """Nothing went wrong with it."""
         return ()
 
-    def told(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Nothing could not be read."""
         return []
 
@@ -156,8 +156,8 @@ class VirtualInstrument:
         samples = place + own + spread * rng.standard_normal((SAMPLES, 3))
         if mishap == 1:  # the arm comes to rest while it is measured
             way = rng.standard_normal(3)
-            rest = np.exp(-np.linspace(0.0, 4.0, SAMPLES))[:, None]
-            samples = samples + _UNREST * self.sigma * rest * way / np.linalg.norm(way)
+            decay = np.exp(-np.linspace(0.0, 4.0, SAMPLES))[:, None]
+            samples = samples + _UNREST * self.sigma * decay * way / np.linalg.norm(way)
         mean, deviation, settling = dwell_figures(samples)
         quaternion = spread_angle = None
         if isinstance(self.device, Artefact) and turned is not None:

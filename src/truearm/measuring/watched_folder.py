@@ -72,7 +72,7 @@ class WatchedFolder:
         folder: That is watched, without the folders in it.
         mapping: Its mapping file, or the name of a preset. The joint positions are those of the plan.
         labels: Of the plan, for tables in which every row is a configuration of its own.
-        now: What time it is [s].
+        clock: What time it is [s].
 
     Raises:
         InputError: If there is no such folder, or the mapping cannot be used here.
@@ -81,7 +81,7 @@ class WatchedFolder:
     kind: Final = "watch"
 
     def __init__(
-        self, folder: Path, mapping: Path, labels: tuple[str, ...], now: Callable[[], float] = time.time
+        self, folder: Path, mapping: Path, labels: tuple[str, ...], clock: Callable[[], float] = time.time
     ) -> None:
         if not folder.is_dir():
             raise InputError(
@@ -92,10 +92,10 @@ class WatchedFolder:
             )
         self.folder, self.mapping, self.content = folder, mapping, read_mapping(mapping)
         _refuse_other_mappings(self.content, mapping)
-        self._labels, self._now = labels, now
+        self._labels, self._clock = labels, clock
         self._files: dict[str, _File] = {}
         self._known: set[tuple[str, str]] | None = None
-        self._said: list[str] = []
+        self._messages: list[str] = []
         self._counts = _Counts()
 
     @property
@@ -116,18 +116,18 @@ class WatchedFolder:
     @property
     def notices(self) -> tuple[Notice, ...]:
         """What could not be read."""
-        found = []
+        notices = []
         counts = self._counts
         if counts.broken:
-            rest = len(counts.broken) - _NAMED
-            more = f" and {rest} more" if rest > 0 else ""
-            found.append(
+            others = len(counts.broken) - _NAMED
+            more = f" and {others} more" if others > 0 else ""
+            notices.append(
                 ROWS_BROKEN(
                     f"{counted(len(counts.broken), 'row')} could not be read: {' '.join(counts.broken[:_NAMED])}{more}"
                 )
             )
         if counts.replaced:
-            found.append(
+            notices.append(
                 FILE_REPLACED(
                     f"{', '.join(dict.fromkeys(counts.replaced))}: rows that were read are no longer there, or have "
                     "changed. What was read stays as it was; rows that differ count as new."
@@ -135,17 +135,19 @@ class WatchedFolder:
             )
         if counts.not_read:
             words = "; ".join(f"{name}: {why.rstrip('.')}" for name, why in sorted(counts.not_read.items())[:_NAMED])
-            rest = len(counts.not_read) - _NAMED
-            found.append(NOT_READ(f"Not read in {self.folder}: {words}{f' and {rest} more' if rest > 0 else ''}."))
+            others = len(counts.not_read) - _NAMED
+            notices.append(
+                NOT_READ(f"Not read in {self.folder}: {words}{f' and {others} more' if others > 0 else ''}.")
+            )
         open_ends = [name for name, file in self._files.items() if file.open_end]
         if open_ends:
-            found.append(
+            notices.append(
                 LINE_WITHOUT_END(
                     f"The last line of {', '.join(open_ends)} has no line break at its end and is not read: it may be "
                     "half of a row."
                 )
             )
-        return tuple(found)
+        return tuple(notices)
 
     def poll(self, session: Session, seconds: float) -> list[Incoming]:
         """Return the readings of new rows, waiting for the first at most some time."""
@@ -159,17 +161,17 @@ class WatchedFolder:
                 return incomings
             time.sleep(min(_PAUSE, left))
 
-    def told(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Return what could not be read since it was asked last."""
-        said, self._said = self._said, []
-        return said
+        messages, self._messages = self._messages, []
+        return messages
 
     def close(self) -> None:
         """Nothing is held."""
 
     def _new(self) -> list[Reading]:
         readings: list[Reading] = []
-        for path, state in self._there():
+        for path, state in self._listed_files():
             file = self._files.setdefault(path.name, _File())
             if file.state != state:
                 try:
@@ -179,9 +181,9 @@ class WatchedFolder:
                 file.state = state
         return readings
 
-    def _there(self) -> list[tuple[Path, tuple[int, int]]]:
+    def _listed_files(self) -> list[tuple[Path, tuple[int, int]]]:
         """Return the files that are read with their size and time, the oldest first."""
-        found: list[tuple[Path, tuple[int, int]]] = []
+        files: list[tuple[Path, tuple[int, int]]] = []
         try:
             paths = sorted(self.folder.iterdir())
         except OSError:
@@ -201,7 +203,7 @@ class WatchedFolder:
                     else f"ends with none of {', '.join(SUFFIXES)}"
                     if path.suffix.lower() not in SUFFIXES
                     else "too many files"
-                    if len(found) >= MOST_FILES
+                    if len(files) >= MOST_FILES
                     else ""
                 )
             except OSError:  # it is gone again
@@ -209,13 +211,13 @@ class WatchedFolder:
             if why:
                 self._not_read(name, why)
             else:
-                found.append((path, (state.st_size, state.st_mtime_ns)))
-        return sorted(found, key=lambda one: (one[1][1], one[0].name))
+                files.append((path, (state.st_size, state.st_mtime_ns)))
+        return sorted(files, key=lambda file: (file[1][1], file[0].name))
 
     def _not_read(self, name: str, why: str) -> None:
         if self._counts.not_read.get(name) != why:
             self._counts.not_read[name] = why
-            self._said.append(f"{name} is not read: {why}")
+            self._messages.append(f"{name} is not read: {why}")
 
     def _rows(self, path: Path, file: _File) -> list[Reading]:
         """Return the readings of the lines of a file that are new."""
@@ -223,7 +225,7 @@ class WatchedFolder:
         self._counts.not_read.pop(path.name, None)
         if file.taken > len(lines) or (file.taken and _digest(lines[: file.taken]) != file.digest):
             self._counts.replaced.append(path.name)
-            self._said.append(f"{path.name}: rows that were read are no longer there, or have changed")
+            self._messages.append(f"{path.name}: rows that were read are no longer there, or have changed")
             file.taken, file.again = 0, True
         layout = self.content.layout
         first = max(file.taken, layout.header or 0, (layout.first_row or 1) - 1)
@@ -275,7 +277,7 @@ class WatchedFolder:
                 readings += self._readings(path, lines, [number])
             except InputError as error:
                 self._counts.broken.append(str(error))
-                self._said.append(str(error))
+                self._messages.append(str(error))
         return readings
 
     def _readings(self, path: Path, lines: list[str], new: list[int]) -> list[Reading]:
@@ -303,7 +305,7 @@ class WatchedFolder:
         """Return when each row was measured [s], ``(rows,)``: by its column of times, or when it was found."""
         order = self.content.order
         if order is None or order.time is None:
-            return np.full(len(cells.lines), self._now())
+            return np.full(len(cells.lines), self._clock())
         places = [place_of(cells, column, self.mapping, f"order.{name}") for name, column in order.names.items()]
         return moments(cells, places, order)
 
@@ -321,7 +323,7 @@ def _readings_of(
     cells, entries = rows.cells, len(content.readings)
     dwell = _dwell(cells, content, mapping)
     turned = None if rows.quaternion is None else _unit(rows.quaternion, cells)
-    found = []
+    readings = []
     for number, name in enumerate(rows.targets):
         row = number // entries
         line = cells.lines[row]
@@ -334,7 +336,7 @@ def _readings_of(
         if name in content.references and np.isnan(position).any():
             continue
         quaternion = None if turned is None or np.isnan(turned[number]).any() else turned[number]
-        found.append(
+        readings.append(
             Reading(
                 name=name,
                 time=float(times[row]),
@@ -348,7 +350,7 @@ def _readings_of(
                 **{key: values[row] for key, values in dwell.items()},  # type: ignore[arg-type]
             )
         )
-    return found
+    return readings
 
 
 def _known_number(values: Array | None, number: int) -> float | None:
@@ -375,7 +377,7 @@ def _dwell(cells: Cells, content: MappingFile, mapping: Path) -> dict[str, list[
     entry = content.dwell
     if entry is None:
         return {}
-    found: dict[str, list[float | int | None]] = {}
+    columns: dict[str, list[float | int | None]] = {}
     for name in ("deviation", "settling", "samples", "breaks"):
         column = getattr(entry, name)
         if column is None:
@@ -397,8 +399,8 @@ def _dwell(cells: Cells, content: MappingFile, mapping: Path) -> dict[str, list[
                 values.append(0 if name == "breaks" else None)
             else:
                 values.append(int(number) if whole else to_si(number, str(entry.unit)))
-        found[name] = values
-    return found
+        columns[name] = values
+    return columns
 
 
 def _refuse_other_mappings(content: MappingFile, mapping: Path) -> None:

@@ -80,8 +80,10 @@ def accuracy_goal(
         return None
     if not isinstance(accurate_at, str | Path):
         count = len(robot.joints)
-        given = array_argument(accurate_at, "accurate_at", ("n", count), f"joint positions, (n, {count}), or a file")
-        return _goal(given, "at the given configurations")
+        configurations = array_argument(
+            accurate_at, "accurate_at", ("n", count), f"joint positions, (n, {count}), or a file"
+        )
+        return _goal(configurations, "at the given configurations")
     path = path_argument(accurate_at, "accurate_at")
     with refusals_of("accurate_at"):
         if path.suffix.lower() == ".csv":
@@ -128,16 +130,16 @@ def _at_targets(robot: Robot, path: Path, tools: str | Path | None, frames: str 
         cell = Cell(placed, read_frames(robot, frame_file, language.base))
     believed = controllers_robot(robot)
     joints = np.concatenate([ResolvedProgram(robot, believed, program, cell).joints for program in programs])
-    found = joints[~np.isnan(joints).any(axis=1)]
-    if not len(found):
+    reached = joints[~np.isnan(joints).any(axis=1)]
+    if not len(reached):
         raise InputError(
             "the robot reaches none of the targets",
             where=str(path),
             came=counted(len(joints), "target"),
             cure="Check that it is this robot's program, and say where its tools and frames are.",
         )
-    of = "" if len(found) == len(joints) else f" of {len(joints)}"
-    return _goal(found, f"at the {len(found)}{of} targets of {path.name}")
+    of = "" if len(reached) == len(joints) else f" of {len(joints)}"
+    return _goal(reached, f"at the {len(reached)}{of} targets of {path.name}")
 
 
 def _box(region: object) -> Array:
@@ -158,15 +160,15 @@ def _box(region: object) -> Array:
 
 def _in_region(robot: Robot, box: Array, rng: np.random.Generator) -> AccuracyGoal:
     base = robot.base
-    found: list[Array] = []
+    parts: list[Array] = []
     low, high = box.T
     for _ in range(_DRAWN // _AT_ONCE):
         drawn = robot.random_configurations(_AT_ONCE, rng)
         place = (robot.rigid.world_poses(drawn)[0] - np.array(base.translation)) @ base.rotation
-        found.append(drawn[((place >= low) & (place <= high)).all(axis=1)])
-        if sum(map(len, found)) >= _IN_REGION:
+        parts.append(drawn[((place >= low) & (place <= high)).all(axis=1)])
+        if sum(map(len, parts)) >= _IN_REGION:
             break
-    inside = np.concatenate(found)[:_IN_REGION]
+    inside = np.concatenate(parts)[:_IN_REGION]
     corners = ", ".join(f"{name} {a * 1e3:g} to {b * 1e3:g}" for name, (a, b) in zip("xyz", box, strict=True))
     if not len(inside):
         raise InputError(
@@ -411,11 +413,11 @@ def predict(
 
     count = len(candidates.rows)
     pool = rng.permutation(count)[:_POOL]
-    kept = candidates.identifiable(max(NUMBERS))
-    least = len(kept) / candidates.rows.shape[1]
+    identified = candidates.identifiable(max(NUMBERS))
+    least = len(identified) / candidates.rows.shape[1]
     numbers = np.array([n for n in NUMBERS if least <= n <= len(pool)], dtype=np.intp)
-    rows, known_of_kept = candidates.rows[pool][..., kept], known[np.ix_(kept, kept)]
-    by_choice = [mean_error(pool[most_informative(rows, int(n), known_of_kept, O1())]) for n in numbers]
+    rows, known_of_identified = candidates.rows[pool][..., identified], known[np.ix_(identified, identified)]
+    by_choice = [mean_error(pool[most_informative(rows, int(n), known_of_identified, O1())]) for n in numbers]
     orders = [rng.permutation(count) for _ in range(_DRAWS)]
     by_chance = [float(np.mean([mean_error(order[:n]) for order in orders])) for n in numbers]
     return Prediction(

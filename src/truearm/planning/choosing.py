@@ -107,7 +107,7 @@ class Reachable:
             self.joints[at], np.broadcast_to(self.finder.home, (len(at), len(self.finder.home)))
         )
         ways = Counter(self.finder.check.words(int(k)) for k in looked.worst[~looked.clear])
-        most = "".join(f"; on the straight ones most often {what}" for what, _ in ways.most_common(1))
+        most = "".join(f"; on the straight ones most often {obstacle}" for obstacle, _ in ways.most_common(1))
         raise InputError(
             "too few configurations have a way from the safe one on which the arm keeps clear",
             parameter="home",
@@ -144,14 +144,14 @@ def chosen_with_ways(
     """
     left = usable
     progress(f"choosing among {len(left)} configurations")
-    found = choose(left)
+    chosen = choose(left)
     if reachable is None:
-        return found, {}
+        return chosen, {}
     straight = 0
     for number in range(1, _ROUNDS + 1):
         progress(f"looking for ways that keep clear, round {number}")
-        reachable.look(found)
-        lost = int(reachable.lost[found].sum())
+        reachable.look(chosen)
+        lost = int(reachable.lost[chosen].sum())
         if not lost:
             break
         left = left[~reachable.lost[left]]
@@ -161,9 +161,9 @@ def chosen_with_ways(
             straight = every - int(reachable.lost[usable].sum() - (len(usable) - every)) - len(left)
             reachable.refuse_too_few(usable, poses)
         progress(f"choosing among {len(left)} configurations, as there was no way to {lost}")
-        found = choose(left)
+        chosen = choose(left)
     without = int(reachable.lost[usable].sum())
-    return found, {name: cost for name, cost in (("ways", without), ("straight ways", straight)) if cost}
+    return chosen, {name: cost for name, cost in (("ways", without), ("straight ways", straight)) if cost}
 
 
 #: How far before a configuration each joint stops, to come to it moving forward [rad; m for sliding joints].
@@ -255,12 +255,12 @@ class _AsSaid:
     robot: Robot
 
     def frames(self, joints: Array) -> Mapping[str, Array]:
-        found = {}
+        frames = {}
         for target in self.robot.targets:
             frame = np.tile(np.eye(4), (len(joints), 1, 1))
             frame[:, :3, 3], frame[:, :3, :3] = self.robot.world_poses(joints, target.name)
-            found[target.name] = frame
-        return found
+            frames[target.name] = frame
+        return frames
 
 
 def device_candidates(
@@ -290,7 +290,7 @@ def plan_measurements(
     noise: float = 1e-4,
     labels: tuple[str, ...] | None = None,
     constraints: Constraints | None = None,
-    where: str = "constraints",
+    place: str = "constraints",
     seen_from_the_origin: bool = True,
     readings: Dataset | None = None,
     finder: WayFinder | None = None,
@@ -309,7 +309,7 @@ def plan_measurements(
         accurate_at: Where that is; None for everywhere.
         noise: Standard deviation of a coordinate about a well identified model [m].
         labels: Names of the candidates; numbers in the order of measurement if None.
-        constraints, where: What a configuration must keep besides the robot's limits, and the file that says so.
+        constraints, place: What a configuration must keep besides the robot's limits, and the file that says so.
         seen_from_the_origin: Whether the instrument stands at the origin of the robot's world, as after a calibration.
         readings: What a device would read at the candidates, see :func:`device_candidates`; None for the positions of
             all targets at each.
@@ -324,12 +324,14 @@ def plan_measurements(
     """
     _check_objective(objective, poses, accurate_at)
     seen = model.prepared(robot)
-    refuse_clearance_of(seen, constraints, where)
-    kept = dict(allowed(seen, candidates, constraints, where, seen_from_the_origin=seen_from_the_origin))
+    refuse_clearance_of(seen, constraints, place)
+    fulfilled = dict(allowed(seen, candidates, constraints, place, seen_from_the_origin=seen_from_the_origin))
     if finder is not None:
-        kept |= {name: keeps for name, keeps in finder.check.kept(candidates.joints).items() if not keeps.all()}
-    rejected = {name: int(np.sum(~keeps)) for name, keeps in kept.items()}
-    usable = np.flatnonzero(np.all(list(kept.values()), axis=0))
+        fulfilled |= {
+            name: keeps for name, keeps in finder.check.clear_of(candidates.joints).items() if not keeps.all()
+        }
+    rejected = {name: int(np.sum(~keeps)) for name, keeps in fulfilled.items()}
+    usable = np.flatnonzero(np.all(list(fulfilled.values()), axis=0))
     _refuse_too_few(poses, len(usable), len(candidates), rejected, labels is not None, drawn)
     search = _Search(seen, model, candidates, usable, readings, finder, rng, noise, poses, objective, accurate_at)
     stops = before(seen, candidates.joints, None if finder is None else finder.low)
@@ -421,18 +423,18 @@ class _Search:
     def choose(self, these: Indices) -> Indices:
         rows, known, started = self.rows(these), self.known, time.process_time()
         if self.poses is None:
-            found = most_informative_number(rows, known)
+            picked = most_informative_number(rows, known)
         else:
-            found = most_informative(rows, self.poses, known, self.goal)
+            picked = most_informative(rows, self.poses, known, self.goal)
         self.seconds += time.process_time() - started
-        return these[np.array(found, dtype=np.intp)]
+        return these[np.array(picked, dtype=np.intp)]
 
     def indices(self, chosen: Indices) -> dict[str, float]:
         rows = self.rows(chosen).reshape(-1, len(self.among))
         return observability(self.known + rows.T @ rows, len(chosen))
 
     def prediction(self, chosen: Indices) -> Prediction:
-        there, order = None, self.place[chosen]
+        at_wanted, order = None, self.place[chosen]
         if self.wanted is not None and self.accurate_at is not None:
             alike = None
             if self.objective != "O1":
@@ -440,10 +442,10 @@ class _Search:
                 by_o1 = np.array(most_informative(rows, len(order), self.known, INDICES["O1"]), dtype=np.intp)
                 alike = model_error(self.derivatives, by_o1, self.wanted, self.noise)
             error = model_error(self.derivatives, order, self.wanted, self.noise)
-            there = There(self.robot.world_poses(self.accurate_at)[0], error, alike)
+            at_wanted = There(self.robot.world_poses(self.accurate_at)[0], error, alike)
         elsewhere = self.elsewhere.joints
-        found = predict(self.robot, self.derivatives, order, self.predicted, elsewhere, self.noise, self.rng)
-        return replace(found, there=there)
+        predicted = predict(self.robot, self.derivatives, order, self.predicted, elsewhere, self.noise, self.rng)
+        return replace(predicted, there=at_wanted)
 
 
 def _fixtures_in_base(robot: Robot) -> dict[str, Array]:
@@ -485,15 +487,15 @@ def _in_words(readings: Dataset) -> tuple[str, ...]:
     """Say what is read at each configuration."""
     words: list[list[str]] = [[] for _ in readings.labels]
     for row, (c, t, f) in enumerate(zip(readings.configuration, readings.target, readings.against, strict=True)):
-        said = readings.targets[t]
+        reading = readings.targets[t]
         beside = readings.fixtures[f] if f >= 0 else ""
         if readings.distance is not None and np.isfinite(readings.distance[row]):
-            said += f" from {beside} {readings.distance[row] * 1e3:.2f} mm"
+            reading += f" from {beside} {readings.distance[row] * 1e3:.2f} mm"
         elif readings.height is not None and np.isfinite(readings.height[row]):
-            said += f" over {beside} {readings.height[row] * 1e3:.2f} mm"
+            reading += f" over {beside} {readings.height[row] * 1e3:.2f} mm"
         elif beside:
-            said += f" at {beside} ({', '.join(f'{v * 1e3:.2f}' for v in readings.position[row])}) mm"
-        words[c].append(said)
+            reading += f" at {beside} ({', '.join(f'{v * 1e3:.2f}' for v in readings.position[row])}) mm"
+        words[c].append(reading)
     return tuple("; ".join(word) for word in words)
 
 
@@ -510,7 +512,7 @@ def _elsewhere(robot: Robot, finder: WayFinder | None, rng: np.random.Generator)
         return random_candidates(robot, _PREDICTED_CONFIGURATIONS, rng)
     low, high = joint_window(robot)
     some = rng.uniform(low, high, (_DRAWN_ELSEWHERE, len(low)))
-    clear = some[finder.check.room(some) >= finder.check.cell.clearance]
+    clear = some[finder.check.smallest_distance(some) >= finder.check.cell.clearance]
     return _forward((clear if len(clear) >= _FEWEST_ELSEWHERE else some)[:_PREDICTED_CONFIGURATIONS])
 
 
@@ -522,15 +524,15 @@ def _refuse_too_few(
         raise InputError("at least one pose is needed", parameter="poses", came=needed, allowed="1 or more, or auto")
     if usable < needed:
         cost = ", ".join(f"{name} {count}" for name, count in rejected.items() if count)
-        came = f"{usable} of {candidates} usable" + (f"; rejected by {cost}" if cost else "")
+        shortage = f"{usable} of {candidates} usable" + (f"; rejected by {cost}" if cost else "")
         cure = "Widen the constraint that costs most, or give more candidates." if cost else "Give more candidates."
         if drawn is not None and len(drawn.joints) < drawn.wanted:
-            came += f"; of {drawn.tried} drawn, too near to {drawn.words}"
+            shortage += f"; of {drawn.tried} drawn, too near to {drawn.words}"
             cure = "Make room where most was lost: smaller boxes, wider limits, a lower `floor`, less `clearance`."
         raise InputError(
             "too few configurations are left to choose from",
             parameter="candidates_from" if named else "candidates",
-            came=came,
+            came=shortage,
             allowed=f"{needed} or more",
             cure=cure,
         )

@@ -71,7 +71,7 @@ class _Region(Given):
         """Return the ranges as they are typed."""
         from truearm.engine.base.units import written
 
-        return [",".join("..".join(f"{written(end, 'mm')}".removesuffix(".0") for end in one) for one in value)]
+        return [",".join("..".join(f"{written(end, 'mm')}".removesuffix(".0") for end in box) for box in value)]
 
 
 class _Speed(Given):
@@ -88,7 +88,7 @@ class _Speed(Given):
         from truearm.engine.base.units import written
 
         speed, *shares = value
-        return [",".join(f"{one:g}" for one in (written(speed, "mm"), *(share * 100.0 for share in shares)))]
+        return [",".join(f"{number:g}" for number in (written(speed, "mm"), *(share * 100.0 for share in shares)))]
 
 
 class PlanPoses(
@@ -185,16 +185,16 @@ class PlanPoses(
         """Refuse a device with given configurations, and what is said of a program that is not asked for."""
         if self.device is not None and self.candidates_from is not None:
             data = self.candidates_from
-            came = str(data) if isinstance(data, str | Path) else kind_of(data)
+            source = str(data) if isinstance(data, str | Path) else kind_of(data)
             raise InputError(
                 "a device finds its own configurations to choose from",
                 parameter="device, candidates_from",
-                came=f"{self.device} and {came}",
+                came=f"{self.device} and {source}",
                 cure="Leave one of them out; `constraints` narrows the choice.",
             )
         for name in ("approach", "speed", "dwell", "wait") if self.program is None else ():
-            given = getattr(self, name)
-            if given is not None and given is not False:
+            setting = getattr(self, name)
+            if setting is not None and setting is not False:
                 raise InputError(
                     "this is said of a measuring program, and none is asked for",
                     parameter=name,

@@ -138,8 +138,8 @@ def _first_move(robot: Robot, language: str, driving: Driving) -> tuple[_Pace, f
     slow, _ = joint_rates(robot)
     turning = min(driving.share * float(slow.min()), driving.speed / far)
     turning = math.radians(math.floor(100.0 * math.degrees(turning)) / 100.0)  # RAPID says two decimals
-    said, speed = first_shares(robot, language, driving.share, driving.speed)
-    return (said, driving.speed, None, turning), speed if language != "RAPID" else 0.0
+    shares, speed = first_shares(robot, language, driving.share, driving.speed)
+    return (shares, driving.speed, None, turning), speed if language != "RAPID" else 0.0
 
 
 def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: Array) -> tuple[_Pace, float]:
@@ -148,11 +148,11 @@ def _move(robot: Robot, language: str, driving: Driving, joints: Array, shown: A
     The angular velocity is of no meaning where the time is said.
     """
     slow, _ = joint_rates(robot)
-    said, speed = joint_shares(robot, language, joints, shown, driving.share, driving.speed)
+    shares, speed = joint_shares(robot, language, joints, shown, driving.share, driving.speed)
     _, most = turned(joints, shown)
     along = fastest_point(robot, joints)
     seconds = max(float((most / slow).max()) / driving.share, along / driving.speed) + _RAMPS
-    pace = (said, driving.speed, math.ceil(100.0 * seconds) / 100.0, driving.share * float(slow.min()))
+    pace = (shares, driving.speed, math.ceil(100.0 * seconds) / 100.0, driving.share * float(slow.min()))
     return pace, speed if language != "RAPID" else 0.0
 
 
@@ -164,14 +164,14 @@ def shown_speed(speed: float) -> str:
 def _carried(robot: Robot) -> Carried:
     """Return what the controller is told of the tool: its tip is the target that is farthest from the flange."""
     flange = robot.controller.flange
-    there = {target.name: np.array(robot.tool_place(target.name).translation) for target in robot.targets}
-    name = max(there, key=lambda one: float(np.linalg.norm(there[one])), default="")
+    places = {target.name: np.array(robot.tool_place(target.name).translation) for target in robot.targets}
+    name = max(places, key=lambda target: float(np.linalg.norm(places[target])), default="")
 
     def of_controller(point: Array) -> tuple[float, float, float]:
         x, y, z = ((point - np.array(flange.translation)) @ flange.rotation).tolist()
         return x, y, z
 
-    tip = of_controller(there[name]) if name else (0.0, 0.0, 0.0)
+    tip = of_controller(places[name]) if name else (0.0, 0.0, 0.0)
     return Carried(name, tip, robot.payload.mass, of_controller(np.array(robot.payload.cog)))
 
 
@@ -273,7 +273,7 @@ class PlanProgram:
             wait=driving.words,
         )
         yield detail(
-            self._told,
+            self._load_words,
             tip=carried.name or None,
             tip_mm=[1e3 * v for v in carried.tip],
             load_kg=carried.mass,
@@ -285,7 +285,7 @@ class PlanProgram:
         )
 
     @property
-    def _told(self) -> str:
+    def _load_words(self) -> str:
         """What the controller is told of the tool, or has to be told by hand."""
         carried = self.carried
         load = f"{number(carried.mass, 3)} kg at ({', '.join(carried.cog_mm)}) mm"

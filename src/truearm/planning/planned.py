@@ -78,7 +78,7 @@ def plan_inputs(
     Raises:
         InputError: If a file cannot be read; one that is not there has no hash.
     """
-    found = hashes_of(
+    hashes = hashes_of(
         robot=robot,
         candidates_from=candidates_from,
         constraints=constraints,
@@ -86,18 +86,18 @@ def plan_inputs(
         tools=tools,
         frames=frames,
     )
-    if isinstance(accurate_at, str | Path) and "accurate_at" in found:
+    if isinstance(accurate_at, str | Path) and "accurate_at" in hashes:
         with refusals_of("accurate_at"):
             beside = [path for path in companions(Path(accurate_at)) if exists(path) and path.is_file()]
             if beside:
-                parts = [found["accurate_at"], *(hash_of(read_bytes(path)) for path in sorted(beside))]
-                found["accurate_at"] = hash_of("".join(parts).encode())
-    return found
+                parts = [hashes["accurate_at"], *(hash_of(read_bytes(path)) for path in sorted(beside))]
+                hashes["accurate_at"] = hash_of("".join(parts).encode())
+    return hashes
 
 
 @dataclass(frozen=True, eq=False)
 class _Read:
-    given: tuple[object, ...]  #: What may be files, none of which is overwritten.
+    inputs: tuple[object, ...]  #: What may be files, none of which is overwritten.
     hashes: dict[str, str]  #: Of these files, by their parameters.
     table: Path | None  #: Where to write; the folder of a plan with a program.
     wanted: ProgramWanted | None  #: The program.
@@ -137,10 +137,10 @@ def planned(asked: PlanPoses) -> Plan:
     goal = accuracy_goal(
         choice.robot, asked.accurate_at, asked.region, asked.tools, asked.frames, np.random.default_rng(asked.seed)
     )
-    made = plan_measurements(
+    chosen = plan_measurements(
         choice.robot,
         choice.among,
-        {one.name: one for one in MODELS}[asked.model],
+        {model.name: model for model in MODELS}[asked.model],
         poses=None if asked.poses == "auto" else asked.poses,
         rng=rng,
         objective=asked.objective or ("O1" if goal is None else ERROR),
@@ -148,7 +148,7 @@ def planned(asked: PlanPoses) -> Plan:
         noise=asked.noise,
         labels=choice.labels,
         constraints=read.rules,
-        where=read.where,
+        place=read.where,
         seen_from_the_origin=choice.own,
         readings=choice.readings,
         finder=choice.finder,
@@ -156,14 +156,14 @@ def planned(asked: PlanPoses) -> Plan:
         progress=asked.progress,
     )
     if read.wanted is not None and not read.wanted.approach:
-        made = replace(made, before=None)
-    plan = _driven(asked, read, choice, made, "" if goal is None else goal.words)
+        chosen = replace(chosen, before=None)
+    plan = _driven(asked, read, choice, chosen, "" if goal is None else goal.words)
     return plan if read.table is None else _written(asked, read, read.table, plan)
 
 
 def _read(asked: PlanPoses) -> _Read:
     """Read robot, cell and program, and find out whether ways are looked for."""
-    given = (
+    inputs = (
         asked.robot,
         asked.candidates_from,
         asked.constraints,
@@ -176,23 +176,23 @@ def _read(asked: PlanPoses) -> _Read:
     )
     table = None
     if asked.out is not None:
-        table = _files(asked.out, *given) if wanted is None else _folder(asked.out, *given)
+        table = _files(asked.out, *inputs) if wanted is None else _folder(asked.out, *inputs)
     device = None if asked.device is None else device_argument(asked.device)
     rules = constraints_argument(asked.constraints)
-    hashes = plan_inputs(*given)
+    hashes = plan_inputs(*inputs)
     asked.progress("reading the robot")
     robot = asked.loads.on(robot_argument(asked.robot))
     joints_are = joints_argument(asked.joints, robot)
     if wanted is not None:
         wanted.check(robot, asked.device)
-    where = str(asked.constraints) if isinstance(asked.constraints, str | Path) else "constraints"
-    cell = cell_argument(robot, rules, where, asked.floor, asked.no_floor, asked.clearance)
+    source = str(asked.constraints) if isinstance(asked.constraints, str | Path) else "constraints"
+    cell = cell_argument(robot, rules, source, asked.floor, asked.no_floor, asked.clearance)
     # What was measured was reached: such configurations are checked where that is asked for.
     driven = asked.candidates_from is None or wanted is not None or asked.no_floor or bool(cell.boxes)
-    driven = driven or any(one is not None for one in (asked.floor, asked.clearance, asked.home))
+    driven = driven or any(option is not None for option in (asked.floor, asked.clearance, asked.home))
     if table is not None and not driven:
         refuse_ways_of_another(ways_beside(table))
-    return _Read(given, hashes, table, wanted, device, robot, rules, where, cell, joints_are, driven)
+    return _Read(inputs, hashes, table, wanted, device, robot, rules, source, cell, joints_are, driven)
 
 
 def _choice(asked: PlanPoses, read: _Read, rng: np.random.Generator) -> _Choice:
@@ -220,25 +220,25 @@ def _choice(asked: PlanPoses, read: _Read, rng: np.random.Generator) -> _Choice:
     return _Choice(seen, among, labels, readings, own, finder, drawn)
 
 
-def _driven(asked: PlanPoses, read: _Read, choice: _Choice, made: MeasurementPlan, words: str) -> Plan:
+def _driven(asked: PlanPoses, read: _Read, choice: _Choice, chosen: MeasurementPlan, words: str) -> Plan:
     """Return the plan with its ways, and with the program that drives it."""
     tour = None
     if choice.finder is not None:
         asked.progress("looking for ways that keep clear")
-        tour = tour_of(choice.finder, made.joints, made.labels, made.before)
+        tour = tour_of(choice.finder, chosen.joints, chosen.labels, chosen.before)
     weighed = asked.payload is not None or read.robot.payload != NO_PAYLOAD
-    told = load_notices(made.robot) if weighed else []
+    notices = load_notices(chosen.robot) if weighed else []
     if tour is not None and read.wanted is None:
-        told += targets_notices(made.robot, read.robot, read.named)
+        notices += targets_notices(chosen.robot, read.robot, read.named)
     plan = Plan(
-        made,
+        chosen,
         asked.again,
-        files_of(*read.given),
+        files_of(*read.inputs),
         asked.noise,
         read.joints_are,
         words,
         tour,
-        told=tuple(told),
+        told=tuple(notices),
         hashes=read.hashes,
     )
     if read.wanted is None:
@@ -246,15 +246,15 @@ def _driven(asked: PlanPoses, read: _Read, choice: _Choice, made: MeasurementPla
     return with_program(plan, read.wanted, read.robot, read.named, weighed=weighed)
 
 
-def _written(asked: PlanPoses, read: _Read, table: Path, found: Plan) -> Plan:
+def _written(asked: PlanPoses, read: _Read, table: Path, plan: Plan) -> Plan:
     """Write the plan, and return it with what is to be known about what it replaced."""
-    if found.program is not None:
-        refuse_other_programs(table, found.program.files, *read.given)
+    if plan.program is not None:
+        refuse_other_programs(table, plan.program.files, *read.inputs)
     asked.progress("writing the files")
-    there = (table.parent, table.name) if found.program is None else (table, TABLE)
-    replaced = replaced_notices(*there, plan_csv(found.made, found.joints_are))
-    found.save(table)
-    return replace(found, replaced=replaced)
+    location = (table.parent, table.name) if plan.program is None else (table, TABLE)
+    replaced = replaced_notices(*location, plan_csv(plan.made, plan.joints_are))
+    plan.save(table)
+    return replace(plan, replaced=replaced)
 
 
 def _files(out: object, *read: object) -> Path:

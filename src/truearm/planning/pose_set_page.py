@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 
 def pose_set_page(poses: PlannedPoses) -> str:
     """Return the page of a set."""
-    made, cube = poses.made, poses.made.cube
-    if cube is None or not made.planes:
+    pose_set, cube = poses.made, poses.made.cube
+    if cube is None or not pose_set.planes:
         drawn, words = _points(poses), "Points in the robot's base frame, joined in the order in which to go to them."
     else:
-        approach = made.rotation[:, :, 2]
-        drawn = pose_cube(PosePlan(cube, made.position, approach, made.planes, made.joints, made.target))
+        approach = pose_set.rotation[:, :, 2]
+        drawn = pose_cube(
+            PosePlan(cube, pose_set.position, approach, pose_set.planes, pose_set.joints, pose_set.target)
+        )
         words = "The cube with its diagonal planes. Tails show from where the tip's z axis comes."
     return Document(
         f"Poses of {poses.robot.title}",
@@ -31,7 +33,7 @@ def pose_set_page(poses: PlannedPoses) -> str:
             pictured("poses", "Where the poses are", words, drawn),
         ],
         poses.command,
-        subtitle=f"{len(made.labels)} poses of the set {made.name}.",
+        subtitle=f"{len(pose_set.labels)} poses of the set {pose_set.name}.",
     ).html(poses)
 
 

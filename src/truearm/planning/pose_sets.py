@@ -100,23 +100,23 @@ def pose_set(
             came=f"set {name} about {_shown(cube.centre)}, {cube.side * 1e3:.5g} mm",
             cure="Take another centre, a smaller side or another orientation.",
         )
-    kept = np.flatnonzero(reached)
+    rows = np.flatnonzero(reached)
     if name == "118":
-        held = joints[kept]
-        order = moving_order(robot, held, points[kept], target, least_move, rng, again=rotation is None)
-        joints[kept] = held  # poses may have been reached anew
-        kept = kept[order]
+        positions = joints[rows]
+        order = moving_order(robot, positions, points[rows], target, least_move, rng, again=rotation is None)
+        joints[rows] = positions  # poses may have been reached anew
+        rows = rows[order]
     elif name == "sphere":
-        kept = kept[short_order(joints[kept])]
-    tip = Tip(robot, target).at(joints[kept])
+        rows = rows[short_order(joints[rows])]
+    tip = Tip(robot, target).at(joints[rows])
     missed = tuple(labels[k] for k in np.flatnonzero(~reached))
     return PoseSet(
         name,
-        tuple(labels[k] for k in kept),
+        tuple(labels[k] for k in rows),
         tip.position,
         tip.rotation,
-        joints[kept],
-        tuple(planes[k] for k in kept) if planes else (),
+        joints[rows],
+        tuple(planes[k] for k in rows) if planes else (),
         target,
         missed,
         None if name == "sphere" else cube,
@@ -152,8 +152,8 @@ def _points(name: str, cube: Cube, plane: str, count: int) -> tuple[list[str], A
     if name == "diagonal":
         return [str(i + 1) for i in range(count)], cube.plane(plane).spread(count), [plane] * count
     shares = [count // 4 + (number < count % 4) for number in range(4)]
-    parts = [one.spread(share) for one, share in zip(cube.planes, shares, strict=True)]
-    names = [one.name for one, share in zip(cube.planes, shares, strict=True) for _ in range(share)]
+    parts = [diagonal.spread(share) for diagonal, share in zip(cube.planes, shares, strict=True)]
+    names = [diagonal.name for diagonal, share in zip(cube.planes, shares, strict=True) for _ in range(share)]
     return [str(i + 1) for i in range(count)], np.concatenate(parts), names
 
 

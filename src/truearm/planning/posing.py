@@ -85,17 +85,17 @@ class PlannedPoses(Record):
     @property
     def answer(self) -> list[str]:
         """What the set is, in words."""
-        made = self.made
-        first = f"{counted(len(made.labels), 'pose')} of the set {made.name}{self._where()}."
-        return [first, *(self._moves() if made.name == "118" else ())]
+        poses = self.made
+        first = f"{counted(len(poses.labels), 'pose')} of the set {poses.name}{self._in_cube()}."
+        return [first, *(self._moves() if poses.name == "118" else ())]
 
     def blocks(self) -> Iterator[Block]:
         """Give what the set is, and where, in mm."""
-        made = self.made
-        missed = list(made.missed)
-        yield say(*self.answer, set=made.name, poses=len(made.labels), target=made.target, missed=missed)
-        if made.cube is not None:
-            yield say(cube_mm={"centre": (made.cube.centre * 1e3).tolist(), "side": made.cube.side * 1e3})
+        poses = self.made
+        missed = list(poses.missed)
+        yield say(*self.answer, set=poses.name, poses=len(poses.labels), target=poses.target, missed=missed)
+        if poses.cube is not None:
+            yield say(cube_mm={"centre": (poses.cube.centre * 1e3).tolist(), "side": poses.cube.side * 1e3})
         yield detail(*joints_lines(self.joints_are), joints_are=self.joints_are)
 
     def _moves(self) -> list[str]:
@@ -103,12 +103,12 @@ class PlannedPoses(Record):
         moves = np.abs(np.diff(self.joints, axis=0)).min(axis=0, initial=np.inf)
         words = {"revolute": degrees, "prismatic": millimetres}
         units = {"revolute": "deg", "prismatic": "mm"}
-        said = []
+        sizes = []
         for kind in words:
             of_kind = [move for move, joint in zip(moves, self.robot.joints, strict=True) if joint.kind == kind]
             if of_kind and np.isfinite(min(of_kind)):
-                said.append(f"{words[kind](min(of_kind))} {units[kind]}")
-        return [f"Every joint moves by {' or '.join(said)} or more from one pose to the next."] if said else []
+                sizes.append(f"{words[kind](min(of_kind))} {units[kind]}")
+        return [f"Every joint moves by {' or '.join(sizes)} or more from one pose to the next."] if sizes else []
 
     def dataset(self) -> Dataset:
         """Return the configurations as measurements whose readings are still missing, at the model's joints."""
@@ -172,7 +172,7 @@ class PlannedPoses(Record):
         """Return where configurations, poses and page are written."""
         return places(file, self.inputs)
 
-    def _where(self) -> str:
+    def _in_cube(self) -> str:
         cube = self.made.cube
         if cube is None:
             return ""
@@ -205,10 +205,10 @@ def posed(asked: PosesOfSet) -> PlannedPoses:
     cube = _cube_poses(asked, arm, target)
     rotation = _rotation(asked.tip_orientation)
     with refusals_of("set" if count is None else "count"):
-        made = pose_set(
+        poses = pose_set(
             arm, asked.set, cube, plane=asked.plane, count=count, target=target, rotation=rotation, seed=asked.seed
         )
-    planned_poses = PlannedPoses(arm, made, asked.again, inputs, joints_are, asked.tip is None)
+    planned_poses = PlannedPoses(arm, poses, asked.again, inputs, joints_are, asked.tip is None)
     if table is not None:
         planned_poses.save(table)
     return planned_poses

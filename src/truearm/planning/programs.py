@@ -86,59 +86,59 @@ TOOL_ASSUMED: Final = Rule(
 )
 
 
-def targets_notices(robot: Robot, given: Robot, device: str = "") -> list[Notice]:
+def targets_notices(robot: Robot, stated: Robot, device: str = "") -> list[Notice]:
     """Return what to know of targets that a plan without a program has assumed.
 
     Args:
         robot: With the targets.
-        given: The robot as the user has it.
+        stated: The robot as the user has it.
         device: What measures, where that was said.
     """
-    if given.targets:
+    if stated.targets:
         return []
     return [
         TOOL_ASSUMED(
             "Nobody said the targets of the flange: what is measured, and kept clear, is assumed, "
-            f"{_taken(robot, given, device, weighed=True)}. State the targets in the robot file."
+            f"{_taken(robot, stated, device, weighed=True)}. State the targets in the robot file."
         )
     ]
 
 
-def assumed_notices(robot: Robot, given: Robot, device: str = "", *, weighed: bool) -> list[Notice]:
+def assumed_notices(robot: Robot, stated: Robot, device: str = "", *, weighed: bool) -> list[Notice]:
     """Return what to know of the load and the targets that a program has taken for those that nobody said.
 
     Args:
         robot: With the targets, and what it carries.
-        given: The robot as the user has it.
+        stated: The robot as the user has it.
         device: What measures, where that was said.
         weighed: Whether the user said what it carries.
     """
-    unsaid = [word for word, said in (("the load", weighed), ("the targets", bool(given.targets))) if not said]
+    unsaid = [word for word, known in (("the load", weighed), ("the targets", bool(stated.targets))) if not known]
     if not unsaid:
         return []
     cures = ["A wrong load can stop the robot or let it give way: state `payload`."] if not weighed else []
-    cures += [] if given.targets else ["State the targets in the robot file."]
+    cures += [] if stated.targets else ["State the targets in the robot file."]
     return [
         TOOL_ASSUMED(
             f"Nobody said {' and '.join(unsaid)} of the flange: the program tells the controller of what is "
-            f"assumed, {_taken(robot, given, device, weighed=weighed)}. {' '.join(cures)}",
+            f"assumed, {_taken(robot, stated, device, weighed=weighed)}. {' '.join(cures)}",
             "warning",
         )
     ]
 
 
-def _taken(robot: Robot, given: Robot, device: str, *, weighed: bool) -> str:
+def _taken(robot: Robot, stated: Robot, device: str, *, weighed: bool) -> str:
     """Say which load and targets a plan has taken for those that nobody said, and whence."""
-    said = [] if weighed else [f"{robot.payload.mass:g} kg at {_at(robot.payload.cog)} mm"]
-    if given.targets:
-        return said[0]
-    there = {one.name: robot.tool_place(one.name).translation for one in robot.targets}
-    name, tool = next(iter(given.tools.items()), ("", DEFAULT_TOOL))
-    said += [f"target {target} at {_at(place)} mm" for target, place in [*there.items()][:_MOST_NAMED]]
+    taken = [] if weighed else [f"{robot.payload.mass:g} kg at {_at(robot.payload.cog)} mm"]
+    if stated.targets:
+        return taken[0]
+    places = {target.name: robot.tool_place(target.name).translation for target in robot.targets}
+    name, tool = next(iter(stated.tools.items()), ("", DEFAULT_TOOL))
+    taken += [f"target {target} at {_at(place)} mm" for target, place in [*places.items()][:_MOST_NAMED]]
     whence = f"the first tool of the robot file, {name}" if name else "three reflectors about 150 mm apart"
-    if there != dict(tool.targets):
+    if places != dict(tool.targets):
         whence = f"as of the device {device}" if device else "targets where the readings have them"
-    return f"{', '.join(said)}{', and others' if len(there) > _MOST_NAMED else ''} ({whence})"
+    return f"{', '.join(taken)}{', and others' if len(places) > _MOST_NAMED else ''} ({whence})"
 
 
 def _at(point: tuple[float, float, float]) -> str:
@@ -272,13 +272,13 @@ FASTER_THAN_ASKED: Final = Rule(
 )
 
 
-def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str = "", *, weighed: bool) -> Plan:
+def with_program(planned: Plan, wanted: ProgramWanted, stated: Robot, device: str = "", *, weighed: bool) -> Plan:
     """Return a plan with the program that drives it.
 
     Args:
         planned: Whose ways were checked; its robot has targets and what it carries, maybe assumed.
         wanted: What was asked for.
-        given: The robot as the user has it.
+        stated: The robot as the user has it.
         device: What measures, where that was said.
         weighed: Whether the user said what it carries.
     """
@@ -289,7 +289,7 @@ def with_program(planned: Plan, wanted: ProgramWanted, given: Robot, device: str
     program, fastest = plan_program(tour, robot, language.name, wanted.driving, mark)
     assert language.motion is not None
     assert program.carried is not None
-    notices = [*_notices(language, robot, given, device, weighed=weighed), *tour.notices]
+    notices = [*_notices(language, robot, stated, device, weighed=weighed), *tour.notices]
     speeds = known_speeds(robot)
     if fastest > _CLOSE * wanted.driving.speed:
         notices.insert(
@@ -396,10 +396,10 @@ def _wait(value: str | None, language: Language) -> tuple[Literal["time", "input
     return "input", name, longest
 
 
-def _notices(language: Language, robot: Robot, given: Robot, device: str, *, weighed: bool) -> list[Notice]:
+def _notices(language: Language, robot: Robot, stated: Robot, device: str, *, weighed: bool) -> list[Notice]:
     notices = [*load_notices(robot), *counts_notices(robot)]
     notices += wider_limits_notices(robot)
-    notices += assumed_notices(robot, given, device, weighed=weighed)
+    notices += assumed_notices(robot, stated, device, weighed=weighed)
     return [*notices, *speed_notices(robot, "" if known_speeds(robot) else _assumed(language, robot))]
 
 

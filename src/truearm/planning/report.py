@@ -160,11 +160,11 @@ def workspace_figure(plan: MeasurementPlan) -> Figure:
     }
     traces = [trace]
     if prediction.there is not None:
-        there = 1e3 * (prediction.there.places - np.array(base.translation)) @ base.rotation
+        places = 1e3 * (prediction.there.places - np.array(base.translation)) @ base.rotation
         trace["name"] = "elsewhere"
         traces.append(
             trace
-            | {letter: rounded_to(column, 1) for letter, column in zip("xyz", there.T, strict=True)}
+            | {letter: rounded_to(column, 1) for letter, column in zip("xyz", places.T, strict=True)}
             | {
                 "name": "where it shall be accurate",
                 "marker": {"size": 5, "color": "#b3261e", "symbol": "diamond"},
@@ -205,19 +205,19 @@ def plan_sheet(planned: Plan) -> str:
 
     Joint positions are those that the controller shows, or the model's where nobody said how it counts.
     """
-    program, made, tour = planned.program, planned.made, planned.tour
+    program, plan, tour = planned.program, planned.made, planned.tour
     assert tour is not None
-    reads = dict(zip(made.labels, made.reads, strict=True)) if made.reads else {}
+    reads = dict(zip(plan.labels, plan.reads, strict=True)) if plan.reads else {}
     files = "" if program is None else f", {', '.join(program.files)}"
-    mark = hash_of(plan_csv(made, planned.joints_are).encode())[:MARK] if program is None else program.mark
+    mark = hash_of(plan_csv(plan, planned.joints_are).encode())[:MARK] if program is None else program.mark
     shown = "as the controller shows them"
-    if program is None and not made.robot.controller.counts_known:
+    if program is None and not plan.robot.controller.counts_known:
         shown = "of the model: nobody said how the controller counts them. Compare every joint with the pendant first"
     return page(
         Path(__file__).with_name("plan-sheet.html.jinja"),
         {},
         planned,
-        title=f"Measuring {made.robot.title}",
+        title=f"Measuring {plan.robot.title}",
         subtitle=f"Plan {mark}{files}: {len(tour.measured)} configurations, joint positions {shown}.",
         words=(*(() if program is None else program.answer), *planned.driving),
         notices=worst_first(planned.own_notices),
@@ -225,9 +225,9 @@ def plan_sheet(planned: Plan) -> str:
         followed="plan" if program is None else "program",
         noted=_NOTED,
         headings=[
-            f"J{k} [{'deg' if joint.kind == 'revolute' else 'mm'}]" for k, joint in enumerate(made.robot.joints, 1)
+            f"J{k} [{'deg' if joint.kind == 'revolute' else 'mm'}]" for k, joint in enumerate(plan.robot.joints, 1)
         ],
-        targets=_ticked([target.name for target in made.robot.targets]),
+        targets=_ticked([target.name for target in plan.robot.targets]),
         reads=bool(reads),
         rows=_rows(planned, tour, reads),
     )

@@ -83,27 +83,27 @@ class Plan(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give what was chosen, what constraints cost, and how accurate the calibration will be, in mm and deg."""
-        made = self.made
+        plan = self.made
         yield say(
-            f"{len(made.joints)} of {made.usable} usable configurations, chosen by {self.chosen_by}.",
-            poses=len(made.joints),
-            objective=made.objective,
-            candidates=made.candidates,
-            usable=made.usable,
-            left_out=list(made.left_out),
-            seconds=made.seconds,
+            f"{len(plan.joints)} of {plan.usable} usable configurations, chosen by {self.chosen_by}.",
+            poses=len(plan.joints),
+            objective=plan.objective,
+            candidates=plan.candidates,
+            usable=plan.usable,
+            left_out=list(plan.left_out),
+            seconds=plan.seconds,
         )
-        broken = (f"  {name}: broken by {lost} of {made.candidates}" for name, lost in made.rejected.items() if lost)
-        yield detail(*broken, rejected=dict(made.rejected))
+        broken = (f"  {name}: broken by {lost} of {plan.candidates}" for name, lost in plan.rejected.items() if lost)
+        yield detail(*broken, rejected=dict(plan.rejected))
         yield detail(
-            "  " + "  ".join(f"{name} {value:.4g}" for name, value in made.indices.items()), indices=dict(made.indices)
+            "  " + "  ".join(f"{name} {value:.4g}" for name, value in plan.indices.items()), indices=dict(plan.indices)
         )
-        if made.fixtures:
-            places = {name: (1e3 * place).tolist() for name, place in made.fixtures.items()}
+        if plan.fixtures:
+            places = {name: (1e3 * place).tolist() for name, place in plan.fixtures.items()}
             at = {name: ", ".join(f"{v:.1f}" for v in place) for name, place in places.items()}
             yield detail(*(f"  {name} at ({v}) mm in the base frame" for name, v in at.items()), fixtures_mm=places)
         if self.tour is not None:
-            yield detail(*self.driving, ways=tour_summary(self.tour, made.robot, self.joints_are))
+            yield detail(*self.driving, ways=tour_summary(self.tour, plan.robot, self.joints_are))
         yield under("prediction", self._accuracy())
         yield detail(*joints_lines(self.joints_are), joints_are=self.joints_are)
         if self.program is not None:
@@ -115,7 +115,7 @@ class Plan(Record):
 
         prediction = self.made.prediction
         if prediction.there is not None:
-            yield under("there", self._there(prediction.there))
+            yield under("there", self._wanted_accuracy(prediction.there))
         planned, floor = prediction.planned * 1e3, prediction.floor * 1e3
         yield say(
             f"Measured at these {len(self.joints)} configurations, the {self.made.model.name} model will miss readings "
@@ -142,20 +142,20 @@ class Plan(Record):
             by_number=[{"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3} for n, c, r in numbers],
         )
 
-    def _there(self, there: There) -> Iterator[Block]:
+    def _wanted_accuracy(self, accuracy: There) -> Iterator[Block]:
         """Give how accurate the robot will be where it shall be, in mm."""
         from truearm.engine.document.drawing import significant
 
-        mean, most = 1e3 * float(there.error.mean()), 1e3 * float(there.error.max())
+        mean, most = 1e3 * float(accuracy.error.mean()), 1e3 * float(accuracy.error.max())
         yield say(
             f"The model itself will be off by {significant(mean, 3)} mm on average {self.accurate_at}, at most by "
             f"{significant(most, 3)} mm.",
             accurate_at=self.accurate_at,
-            places=len(there.error),
+            places=len(accuracy.error),
             mean_mm=mean,
             max_mm=most,
         )
-        by_o1 = None if there.by_o1 is None else 1e3 * float(there.by_o1.mean())
+        by_o1 = None if accuracy.by_o1 is None else 1e3 * float(accuracy.by_o1.mean())
         if by_o1 is None:
             yield say(by_O1_mean_mm=None)
         else:

@@ -18,7 +18,7 @@ from truearm.engine.command.arguments import (
     readings_argument,
     robot_argument,
 )
-from truearm.engine.command.split import told_of
+from truearm.engine.command.split import faults_of
 from truearm.engine.data.controller_joints import in_controller_joints
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.robodk import robodk_csv
@@ -48,25 +48,25 @@ class ConvertedRobot(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give what was done."""
-        robot, done = self.robot, self.robot.history[-1]
+        robot, step = self.robot, self.robot.history[-1]
         yield _of_file(
-            self.file, f"{robot.name}, {done}.", robot=robot.name, convention=robot.convention_name, history=done
+            self.file, f"{robot.name}, {step}.", robot=robot.name, convention=robot.convention_name, history=step
         )
 
 
-def _of_file(file: Path | None, words: str, **held: Any) -> Words:
+def _of_file(file: Path | None, words: str, **fields: Any) -> Words:
     """Return a line about a file that was written, or about its content where none was."""
-    return say(words if file is None else f"{file}: {words}", file=None if file is None else str(file), **held)
+    return say(words if file is None else f"{file}: {words}", file=None if file is None else str(file), **fields)
 
 
 def converted_robot(asked: ConvertRobot) -> ConvertedRobot:
     """Convert a robot, and write it."""
     file = None if asked.out is None else new_file_for(asked.out)
     with refusals_of("robot"):
-        made = converted(robot_argument(asked.robot), asked.convention)
+        robot = converted(robot_argument(asked.robot), asked.convention)
     if file is not None:
-        write_new_text(file, robot_text(made))
-    return ConvertedRobot(made, file)
+        write_new_text(file, robot_text(robot))
+    return ConvertedRobot(robot, file)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,10 +103,12 @@ def exported_robot(asked: ExportRobot) -> ExportedRobot:
     robot = robot_argument(asked.robot)
     refuse_pushed(robot)
     with refusals_of("robot"):
-        made = FORMATS[asked.format](robot)
+        export = FORMATS[asked.format](robot)
     if file is not None:
-        write_new_text(file, made.text)
-    return ExportedRobot(robot, asked.format, made.text, made.frames, made.left_out, file, tuple(told_of(robot)))
+        write_new_text(file, export.text)
+    return ExportedRobot(
+        robot, asked.format, export.text, export.frames, export.left_out, file, tuple(faults_of(robot))
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

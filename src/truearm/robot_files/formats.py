@@ -6,36 +6,27 @@ import ast
 import csv
 import io
 import json
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
-from pathlib import Path
 from textwrap import wrap
 from typing import Any, Final
 
 import numpy as np
 
 from truearm.engine.base.errors import InputError, did_you_mean
-from truearm.engine.base.files import read_text
-from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.base.units import (
-    ANGLE_UNITS,
-    LENGTH_UNITS,
     SHOWN_AS,
-    as_number,
-    checked_unit,
     from_si,
-    sized_si,
     to_si,
     without_mark,
     written,
 )
 from truearm.engine.robot.balancers import Balancer
 from truearm.engine.robot.chain import Array, Element, across, axis_of
-from truearm.engine.robot.conventions.convention import JOINT, JointKind
+from truearm.engine.robot.conventions.convention import JOINT
 from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.dh_table import DHRow, DHTable, TableConvention
 from truearm.engine.robot.effects.balancing import Balancing
@@ -46,7 +37,7 @@ from truearm.engine.robot.effects.link_bending import bending_names
 from truearm.engine.robot.effects.run_out import run_out_names
 from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.robot import Robot
-from truearm.engine.robot.transform import IDENTITY, Transform
+from truearm.engine.robot.transform import IDENTITY
 from truearm.engine.robot.ur_kinematics import KINEMATICS_FILE, kinematics_text
 from truearm.engine.robot.urdf_tree import roll_pitch_yaw
 from truearm.engine.robot.urdf_writing import (
@@ -90,108 +81,6 @@ def complete_dh_csv(table: DHTable, comments: Sequence[str]) -> str:
     for name, place in (("base", table.base), ("flange", table.flange)):
         writer.writerow([name, *(repr(written(v, "mm")) for v in place.translation), *map(repr, place.quaternion)])
     return "".join(f"# {line}\n" for line in comments) + dh_csv(table) + "\n" + stream.getvalue()
-
-
-def read_dh_csv(path: Path, convention_name: TableConvention) -> DHTable:
-    """Read a DH table from a CSV file; its base and flange are the identity unless it gives them.
-
-    The columns are ``joint``, ``a [mm]``, ``alpha [deg]``, ``d [mm]`` and ``theta_offset [deg]``, in any
-    order and unit, ``beta [deg]`` in a Hayati table, and ``type`` where a joint slides. Behind the rows the frames
-    ``base`` and ``flange`` may stand, under the header ``frame,x [mm],y [mm],z [mm],qw,qx,qy,qz``.
-
-    Args:
-        convention_name: The form the numbers are in; no table says it of itself.
-    """
-    text = read_text(path)
-    refuse_beyond("entries", text.count("\n") + text.count("\r") + text.count(","), where=str(path))
-    uncommented = ("" if line.startswith("#") else line for line in text.splitlines())
-    try:
-        lines = [
-            (f"{path}, line {number}", [cell.strip() for cell in cells])
-            for number, cells in enumerate(csv.reader(uncommented), 1)
-            if any(cell.strip() for cell in cells)
-        ]
-    except csv.Error as error:
-        raise InputError(f"the table cannot be read ({error})", where=str(path)) from error
-    if not lines:
-        raise InputError("the file holds comments and no table", where=str(path))
-    known = _columns(convention_name)
-    columns = _header(lines[0][1], known, lines[0][0])
-    end = next((i for i, (_, cells) in enumerate(lines) if tuple(cells) == _FRAMES), len(lines))
-    if end == 1:
-        raise InputError("the table has no rows", where=str(path))
-    rows = []
-    for where, cells in lines[1:end]:
-        _count(cells, len(columns), where)
-        entry = dict(zip((name for name, _ in columns), cells, strict=True))
-        kind: JointKind = "prismatic" if entry.get("type") == "prismatic" else "revolute"
-        if entry.get("type", kind) != kind:
-            raise InputError(
-                "a joint has no such type", where=f"{where}, type", came=entry["type"], allowed="revolute, prismatic"
-            )
-        si = {name: _si(entry[name], unit, f"{where}, {name}") for name, unit in columns if unit}
-        rows.append(DHRow(entry["joint"], kind, **si))
-    table = DHTable(convention_name, tuple(rows), Transform(), Transform())
-    if end == len(lines):
-        return table
-    places = _frames(lines[end + 1 :], str(path))
-    return replace(table, base=places["base"], flange=places["flange"])
-
-
-def _header(cells: Sequence[str], known: dict[str, str], where: str) -> list[tuple[str, str]]:
-    """Return name and unit of each column; names without a unit have an empty one."""
-    columns = []
-    for cell in cells:
-        name, _, rest = cell.strip().partition("[")
-        name, unit = name.strip(), rest.removesuffix("]").strip()
-        if name in known:
-            unit = checked_unit(unit, LENGTH_UNITS if known[name] == "m" else ANGLE_UNITS, f"{where}, column {name}")
-        columns.append((name, unit))
-    names = [name for name, _ in columns]
-    needed = ["joint", *known]
-    if sorted(set(names) - {"type"}) != sorted(needed) or len(set(names)) < len(names):
-        raise InputError(
-            "these are not the columns of a DH table",
-            where=where,
-            came=", ".join(names),
-            allowed=f"{', '.join(needed)}, each once, with their units in brackets; and type",
-            cure="Separate the columns by commas.",
-        )
-    return columns
-
-
-def _frames(lines: Sequence[tuple[str, Sequence[str]]], path: str) -> dict[str, Transform]:
-    found = {}
-    for where, cells in lines:
-        _count(cells, len(_FRAMES), where)
-        x, y, z = (_si(cell, "mm", f"{where}, {axis}") for cell, axis in zip(cells[1:4], "xyz", strict=True))
-        w, i, j, k = (_si(cell, "1", f"{where}, quaternion") for cell in cells[4:])
-        if abs(math.hypot(w, i, j, k) - 1.0) > 1e-6:
-            raise InputError("a quaternion must have length 1", where=where, came=f"{math.hypot(w, i, j, k):.6g}")
-        found[cells[0]] = Transform((x, y, z), (w, i, j, k))
-    names = [cells[0] for _, cells in lines]
-    if sorted(names) != ["base", "flange"]:
-        raise InputError(
-            "these are not the frames of a table",
-            where=path,
-            came=", ".join(names) or "none",
-            allowed="base and flange, each once",
-        )
-    return found
-
-
-def _count(cells: Sequence[str], expected: int, where: str) -> None:
-    if len(cells) != expected:
-        raise InputError(
-            "the row does not have as many cells as the header", where=where, came=len(cells), allowed=str(expected)
-        )
-
-
-def _si(text: str, unit: str, where: str) -> float:
-    value = as_number(text)
-    if value is None:
-        raise InputError("a number belongs here", where=where, came=text)
-    return sized_si(value, unit, where, came=text)
 
 
 SCHEMA: Final = "truearm-model/1"
@@ -276,7 +165,7 @@ def _balancer(b: Balancer) -> dict[str, Any]:
 
 
 def _elements(robot: Robot, elements: Iterable[Element]) -> list[dict[str, Any]]:
-    found = []
+    entries = []
     for element in elements:
         value = element.value if element.parameter is None else robot.values[element.parameter]
         entry: dict[str, Any] = {"motion": element.motion, "value": value}
@@ -286,8 +175,8 @@ def _elements(robot: Robot, elements: Iterable[Element]) -> list[dict[str, Any]]
             entry["parameter"] = element.parameter
         if element.variable is not None:
             entry["joint"] = element.variable + 1
-        found.append(entry)
-    return found
+        entries.append(entry)
+    return entries
 
 
 def _parameter(p: Parameter) -> dict[str, Any]:
@@ -335,8 +224,8 @@ def python_text(robot: Robot, comments: Sequence[str]) -> str:
 
 def _description(robot: Robot, comments: Sequence[str]) -> str:
     count = len(robot.joints)
-    said = [line for comment in comments for line in (*wrap(comment, _WIDTH), "")]
-    text = "\n".join(said).replace("\\", "\\\\").replace('"', '\\"')
+    lines = [line for comment in comments for line in (*wrap(comment, _WIDTH), "")]
+    text = "\n".join(lines).replace("\\", "\\\\").replace('"', '\\"')
     return f'''"""{text}
 Only NumPy is needed, and nothing of truearm. Run as a program, the file compares itself with stored poses.
 
@@ -415,8 +304,8 @@ def _bodies(robot: Robot) -> tuple[list[tuple[Row, Row]], list[tuple[int, float,
         """Return a point of a link in the frame behind its joint, or of the base."""
         if link == 0:
             return point
-        there = robot.axial_slides.stayed(link, (point[0], point[1], point[2]), robot.values)
-        return _tidy((inverses[link - 1] @ behind[link - 1] @ [*there, 1.0])[:3])
+        stayed = robot.axial_slides.stayed(link, (point[0], point[1], point[2]), robot.values)
+        return _tidy((inverses[link - 1] @ behind[link - 1] @ [*stayed, 1.0])[:3])
 
     masses = [(mass.joint - 1, mass.mass, seen(mass.joint, mass.cog)) for mass in robot.masses if mass.mass]
     balancers: list[tuple[object, ...]] = []
@@ -516,16 +405,18 @@ def exported(robot: Robot, format_: str) -> Export:
 
 
 def _table(robot: Robot, convention_name: TableConvention) -> Export:
-    made = converted(_in_base(robot), convention_name)
-    units = made.convention.row_units("revolute")
-    rows = tuple(DHRow(j.name, j.kind, **{c: _tidy_export(v, units[c]) for c, v in j.row.items()}) for j in made.joints)
-    table = DHTable(convention_name, rows, made.base, made.flange)
+    in_convention = converted(_in_base(robot), convention_name)
+    units = in_convention.convention.row_units("revolute")
+    rows = tuple(
+        DHRow(j.name, j.kind, **{c: _tidy_export(v, units[c]) for c, v in j.row.items()}) for j in in_convention.joints
+    )
+    table = DHTable(convention_name, rows, in_convention.base, in_convention.flange)
     name = "A table"
     limits = [f"{name} cannot hold the limits of joints."] if any(joint.limits for joint in robot.joints) else []
     left = (*left_out(robot, name), *masses_left_out(robot, name), *limits)
-    frame = f"{frames(robot)} {first_frame_remark(made.base)}"
-    said = [*comments(robot, frame, left), f"convention {convention_name}: link = {_PRODUCTS[convention_name]}"]
-    return Export(complete_dh_csv(table, said), frame, left)
+    frame = f"{frames(robot)} {first_frame_remark(in_convention.base)}"
+    remarks = [*comments(robot, frame, left), f"convention {convention_name}: link = {_PRODUCTS[convention_name]}"]
+    return Export(complete_dh_csv(table, remarks), frame, left)
 
 
 def _tidy_export(value: float, unit: str) -> float:
@@ -535,11 +426,11 @@ def _tidy_export(value: float, unit: str) -> float:
 
 def _urdf(robot: Robot) -> Export:
     text, left = urdf_text(robot)
-    first, _, rest = text.partition("\n")
+    first, _, body = text.partition("\n")
     frame = f"{frames(robot)} They are the links tool0 and base_link."
-    said = without_mark(comments(robot, frame, left))  # which the URDF has already
-    said = [re.sub("-(?=-)", "- ", line) for line in said]  # XML comments hold no two hyphens
-    return Export("\n".join([first, "<!--", *said, "-->", rest]), frame, tuple(left))
+    remarks = without_mark(comments(robot, frame, left))  # which the URDF has already
+    remarks = [re.sub("-(?=-)", "- ", line) for line in remarks]  # XML comments hold no two hyphens
+    return Export("\n".join([first, "<!--", *remarks, "-->", body]), frame, tuple(left))
 
 
 def _json(robot: Robot) -> Export:
@@ -549,14 +440,14 @@ def _json(robot: Robot) -> Export:
 
 
 def _python(robot: Robot) -> Export:
-    held = [*(effect.name for effect in robot.effects if effect.exportable), Balancing.name]
-    left = tuple(left_out(robot, "A Python file", held))
+    known = [*(effect.name for effect in robot.effects if effect.exportable), Balancing.name]
+    left = tuple(left_out(robot, "A Python file", known))
     return Export(python_text(_in_base(robot), comments(robot, frames(robot), left)), frames(robot), left)
 
 
 def _ur_kinematics(robot: Robot) -> Export:
-    text, said = kinematics_text(_in_base(robot))
-    left = (*left_out(robot, KINEMATICS_FILE), *said)
+    text, losses = kinematics_text(_in_base(robot))
+    left = (*left_out(robot, KINEMATICS_FILE), *losses)
     frame = f"{frames(robot)} They are base_link_inertia and tool0 of ur_description."
     head = "".join(f"# {line}\n" for line in comments(robot, frame, left))
     return Export(head + text, frame, left)

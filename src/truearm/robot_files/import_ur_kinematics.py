@@ -111,10 +111,10 @@ def imported_kinematics(asked: ImportUrKinematics) -> ImportedKinematics:
     with refusals_of("file"):
         factory_kinematics = read_kinematics(path)
     with refusals_of("robot"):
-        made = with_kinematics(type_, factory_kinematics)
+        robot = with_kinematics(type_, factory_kinematics)
     fitting = _fitting(factory_kinematics, type_)
     try:
-        refuse_far(made, type_, str(path))
+        refuse_far(robot, type_, str(path))
     except InputError as error:
         if fitting:
             words = f"Of the library, {' and '.join(fitting)} {'fits' if len(fitting) == 1 else 'fit'}."
@@ -124,11 +124,11 @@ def imported_kinematics(asked: ImportUrKinematics) -> ImportedKinematics:
         error.parameter = "robot"
         raise error from None
     if target is not None:
-        write_new_text(target, robot_text(made))
-    return ImportedKinematics(made, type_, mean_distance(made, type_), fitting, target)
+        write_new_text(target, robot_text(robot))
+    return ImportedKinematics(robot, type_, mean_distance(robot, type_), fitting, target)
 
 
-def _fitting(found: FactoryKinematics, type_: Robot) -> dict[str, float]:
+def _fitting(kinematics: FactoryKinematics, type_: Robot) -> dict[str, float]:
     """Return the other types of the library that a file fits as well, with their largest joint zero [rad]."""
     names = {}
     for name in library():
@@ -136,9 +136,9 @@ def _fitting(found: FactoryKinematics, type_: Robot) -> dict[str, float]:
         if name == type_.name:
             continue
         try:
-            made = with_kinematics(other, found)
-            refuse_far(made, other, name)
+            robot = with_kinematics(other, kinematics)
+            refuse_far(robot, other, name)
         except InputError:  # no arm of this kind, or far from this one
             continue
-        names[name] = largest_zero(made)
+        names[name] = largest_zero(robot)
     return names

@@ -25,7 +25,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.engine.command.split import told_of
+from truearm.engine.command.split import faults_of
 from truearm.engine.command.texts import positions_of
 from truearm.engine.data.readers.configurations import read_poses
 from truearm.engine.diagnose.external_force import check_force
@@ -140,7 +140,7 @@ class JointTable(Record):
         joint_solutions = self.solutions
         reached, status = (
             len(set(joint_solutions.pose[joint_solutions.usable].tolist())),
-            Counter(one.value for one in joint_solutions.status),
+            Counter(pose_status.value for pose_status in joint_solutions.status),
         )
         counts = ", ".join(f"{count} {name}" for name, count in status.items())
         yield say(
@@ -165,12 +165,12 @@ def found_joints(asked: FindJoints) -> JointTable:
     joints_are = joints_argument(asked.joints, arm)
     labels, positions, turned = _poses(asked.poses, asked.rotations)
     if turned is None and asked.orientation != "free":
-        given = isinstance(asked.poses, str | Path)
+        is_file = isinstance(asked.poses, str | Path)
         raise InputError(
             "the poses have no orientation",
-            parameter="poses" if given else "rotations",
-            where=str(asked.poses) if given else None,
-            allowed="the columns qw, qx, qy, qz" if given else "rotation matrices, (n, 3, 3)",
+            parameter="poses" if is_file else "rotations",
+            where=str(asked.poses) if is_file else None,
+            allowed="the columns qw, qx, qy, qz" if is_file else "rotation matrices, (n, 3, 3)",
             cure="Add them, or use `orientation=free`.",
         )
     near = _near(asked, arm, joints_are, len(positions))
@@ -187,8 +187,8 @@ def found_joints(asked: FindJoints) -> JointTable:
         )
     if file is not None:
         write_text(file, joints_csv(solutions, labels, arm.joints, counting(arm, joints_are)))
-    told = (*told_of(arm), *check_force([(arm, solutions.joints[solutions.usable])]))
-    notices = (*told, *_other_frame(arm, asked.frame, asked.target))
+    warnings = (*faults_of(arm), *check_force([(arm, solutions.joints[solutions.usable])]))
+    notices = (*warnings, *_other_frame(arm, asked.frame, asked.target))
     return JointTable(labels, solutions, notices, joints_are, arm.simulated_from)
 
 

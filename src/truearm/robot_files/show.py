@@ -45,14 +45,14 @@ class RobotList(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give one line a robot, below what its columns are."""
-        rows, held = list[tuple[str, ...]](), list[dict[str, Any]]()
+        rows, entries = list[tuple[str, ...]](), list[dict[str, Any]]()
         for robot in self.robots:
             known = robot.controller != AS_THE_MODEL
             reach = "-" if robot.reach is None else f"{robot.reach.distance * 1e3:.6g} mm"
             title = robot.title.removeprefix(robot.maker).strip()
             count = len(robot.joints)
             rows.append((robot.name, robot.maker or "-", str(count), reach, "known" if known else "-", title))
-            held.append(
+            entries.append(
                 {
                     "id": robot.name,
                     "maker": robot.maker or None,
@@ -63,7 +63,7 @@ class RobotList(Record):
                     "source": robot.source,
                 }
             )
-        yield Table(("id", "maker", "joints", "reach", "controller", "robot"), rows, held={"robots": held})
+        yield Table(("id", "maker", "joints", "reach", "controller", "robot"), rows, in_json={"robots": entries})
 
 
 def listed_robots(asked: ListRobots) -> RobotList:
@@ -80,8 +80,8 @@ def listed_robots(asked: ListRobots) -> RobotList:
 
 def _of_maker(robots: list[Robot], maker: str) -> list[Robot]:
     makers = sorted({robot.maker for robot in robots if robot.maker})
-    found = [robot for robot in robots if letters(maker) and _begins(robot.maker, maker)]
-    if not found:
+    matching = [robot for robot in robots if letters(maker) and _begins(robot.maker, maker)]
+    if not matching:
         near = nearest_names(maker, makers)
         raise InputError(
             "the library has no robot of this maker",
@@ -90,7 +90,7 @@ def _of_maker(robots: list[Robot], maker: str) -> list[Robot]:
             allowed=", ".join(makers),
             cure=f"Did you mean {' or '.join(near)}?" if near else None,
         )
-    return found
+    return matching
 
 
 def _begins(maker: str, text: str) -> bool:
@@ -100,8 +100,8 @@ def _begins(maker: str, text: str) -> bool:
 
 
 def _with_axes(robots: list[Robot], axes: int) -> list[Robot]:
-    found = [robot for robot in robots if len(robot.joints) == axes]
-    if not found:
+    matching = [robot for robot in robots if len(robot.joints) == axes]
+    if not matching:
         known = sorted({len(robot.joints) for robot in robots})
         raise InputError(
             "none of these robots has so many joints",
@@ -109,14 +109,14 @@ def _with_axes(robots: list[Robot], axes: int) -> list[Robot]:
             came=axes,
             allowed=", ".join(str(count) for count in known),
         )
-    return found
+    return matching
 
 
 def _named(robots: list[Robot], text: str) -> list[Robot]:
     words = [letters(word) for word in text.split()]
     # Words by themselves, as of one maker and type, or together, as a type is written with blanks.
-    found = [robot for robot in robots if all(words) and words and _holds(robot, words, letters(text))]
-    if not found:
+    matching = [robot for robot in robots if all(words) and words and _holds(robot, words, letters(text))]
+    if not matching:
         near = [name for name in close_names(text) if any(robot.name == name for robot in robots)]
         raise InputError(
             "none of these robots is called so",
@@ -124,7 +124,7 @@ def _named(robots: list[Robot], text: str) -> list[Robot]:
             came=text,
             cure=f"Did you mean {' or '.join(near)}?" if near else "Run 'truearm robots' for all.",
         )
-    return found
+    return matching
 
 
 def _holds(robot: Robot, words: list[str], together: str) -> bool:
@@ -302,10 +302,10 @@ class RobotDescription(Record):
         proof = self.robot.proof
         if proof is None:
             return say(proof=None)
-        held = {**proof.summary(), "intact": is_intact(self.robot)}
-        words = ", ".join(dict.fromkeys([held["status"], *held["errors"]]))
+        summary = {**proof.summary(), "intact": is_intact(self.robot)}
+        words = ", ".join(dict.fromkeys([summary["status"], *summary["errors"]]))
         words += f"; held at known places: {', '.join(proof.held)}" if proof.held else ""
-        return say(f"Calibration: {words}{'' if held['intact'] else '; values were changed since'}", proof=held)
+        return say(f"Calibration: {words}{'' if summary['intact'] else '; values were changed since'}", proof=summary)
 
 
 def _named_list(label: str, names: Sequence[str]) -> list[str]:
@@ -367,7 +367,9 @@ def described(asked: ShowRobot) -> RobotDescription:
         return RobotDescription(arm)
     count = len(arm.joints)
     joints = positions_of(asked.joint_positions, arm, whose, "joint_positions")
-    given = array_argument(joints, "joint_positions", (count,), f"{count} numbers, one for each joint of {arm.name}")
+    positions = array_argument(
+        joints, "joint_positions", (count,), f"{count} numbers, one for each joint of {arm.name}"
+    )
     if whose == "controller" and not isinstance(asked.joint_positions, str):
-        given = arm.controller.to_model(given[None])[0]
-    return RobotDescription(arm, ShownPose(arm, np.array(given)))
+        positions = arm.controller.to_model(positions[None])[0]
+    return RobotDescription(arm, ShownPose(arm, np.array(positions)))

@@ -117,7 +117,7 @@ class InfluenceResult(Record):
             )
         return rows
 
-    def found(self) -> list[dict[str, Any]]:
+    def parameter_rows(self) -> list[dict[str, Any]]:
         """Return what each way found of each parameter, as JSON holds it; nothing without readings."""
         if self.identified is None:
             return []
@@ -157,8 +157,8 @@ class InfluenceResult(Record):
 
     def result(self) -> dict[str, Any]:
         """Return what ``result.json`` holds."""
-        found = {} if self.identified is None else {"parameters": self.found()}
-        return {"truearm": "truearm-influence/1", **self.summary(), "command": self.command, **found}
+        identified = {} if self.identified is None else {"parameters": self.parameter_rows()}
+        return {"truearm": "truearm-influence/1", **self.summary(), "command": self.command, **identified}
 
     def csv_text(self) -> str:
         """Return the influence of every parameter at every configuration as CSV."""
@@ -194,20 +194,20 @@ class InfluenceResult(Record):
         return tuple(folder / name for name in files)
 
 
-def _worth(found: Identified) -> Iterator[Block]:
+def _worth(identified: Identified) -> Iterator[Block]:
     """Give the errors of each way to identify, in mm and mrad."""
-    part = "none of them has seen" if found.held_out else "all of them were made from"
-    judged = next(iter(found.errors.values())).configurations
+    part = "none of them has seen" if identified.held_out else "all of them were made from"
+    judged = next(iter(identified.errors.values())).configurations
     yield say(
         f"On {counted(judged, 'configuration')} that {part}:",
-        held_out=found.held_out,
-        training=found.training,
-        frames=found.frames,
+        held_out=identified.held_out,
+        training=identified.training,
+        frames=identified.frames,
     )
     width = max(map(len, WAYS.values()))
     ways = (
         under(way, [say(f"  {WAYS[way]:<{width}}  {error_line(errors)}", **errors_summary(errors))])
-        for way, errors in found.errors.items()
+        for way, errors in identified.errors.items()
     )
     yield under("errors", ways)
 
@@ -221,7 +221,7 @@ _LEAST: Final = 5
 
 
 @dataclass(frozen=True, eq=False)
-class _Given:
+class _Prepared:
     robot: Robot  #: As it was given.
     nominal: Robot  #: With what it carried, and the effects of the model.
     model: Model
@@ -240,45 +240,45 @@ class _Parts:
     second: Dataset | None  #: What judges; None if nothing is held out.
 
 
-def found(asked: FindInfluence) -> InfluenceResult:
+def analysed(asked: FindInfluence) -> InfluenceResult:
     """Change the parameters, identify them if there are readings, and write what comes of it."""
     refuse_swapped(asked.robot, asked.data, "influence")
     inputs = (asked.robot, asked.data)
     folder = None if asked.out is None else folder_beside(INFLUENCE_FILES, INFLUENCE_FILES[0], asked.out, *inputs)
     asked.progress("reading the robot")
-    given = _read(asked)
-    names, measured = given.names, given.measured
+    prepared = _read(asked)
+    names, measured = prepared.names, prepared.measured
     identified, notices = None, list[Notice]()
     if measured is None:
         n = asked.poses or 118
         refuse_beyond("derivatives", 9 * len(names) * n, parameter="poses")
-        placed, labels = given.nominal, tuple(str(number) for number in range(1, n + 1))
-        at = Postures(given.nominal.random_configurations(n, np.random.default_rng(asked.seed)))
+        placed, labels = prepared.nominal, tuple(str(number) for number in range(1, n + 1))
+        at = Postures(prepared.nominal.random_configurations(n, np.random.default_rng(asked.seed)))
     else:
         labels, at = measured.labels, measured.postures
         refuse_beyond("derivatives", 9 * len(names) * len(labels), parameter="data")
         with refusals_of("data"):
             asked.progress("placing the nominal robot")
-            parts = _parts(asked, given, measured)
+            parts = _parts(asked, prepared, measured)
             placed = parts.placed
             split = train_count(asked.train, len(labels), measured.source), len(labels), asked.seed
-            notices += check_trained_before(given.robot, measured, None, split, "")
+            notices += check_trained_before(prepared.robot, measured, None, split, "")
             asked.progress("identifying the parameters in every way")
-            identified = _identified(asked, given, parts)
+            identified = _identified(asked, prepared, parts)
         notices += _compared(identified)
     asked.progress("changing one parameter after the other")
-    made = influence_of(placed, at, names, given.tip, given.changes)
-    notices += _still(made)
+    influence = influence_of(placed, at, names, prepared.tip, prepared.changes)
+    notices += _still(influence)
     result = InfluenceResult(
         placed,
-        made,
+        influence,
         labels,
-        "the flange" if given.tip is None else f"target {given.tip}",
+        "the flange" if prepared.tip is None else f"target {prepared.tip}",
         identified,
         tuple(notices),
         asked.again,
         files_of(*inputs),
-        parts_of((given.robot, measured)),
+        parts_of((prepared.robot, measured)),
     )
     if folder is not None:
         asked.progress("writing the files")
@@ -286,9 +286,9 @@ def found(asked: FindInfluence) -> InfluenceResult:
     return result
 
 
-def _read(asked: FindInfluence) -> _Given:
+def _read(asked: FindInfluence) -> _Prepared:
     """Read robot and data, and say what is changed by how much."""
-    model = next(one for one in MODELS if one.name == asked.model)
+    model = next(entry for entry in MODELS if entry.name == asked.model)
     robot = robot_argument(asked.robot)
     nominal = model.prepared(asked.loads.on(robot))
     names = _names(nominal, model)
@@ -297,7 +297,7 @@ def _read(asked: FindInfluence) -> _Given:
     by_unit = {"rad": asked.angle, "m": asked.length}
     parameters = [nominal.parameters[name] for name in names]
     changes = {parameter.name: by_unit.get(parameter.unit, parameter.prior) for parameter in parameters}
-    return _Given(robot, nominal, model, names, changes, measured, tip)
+    return _Prepared(robot, nominal, model, names, changes, measured, tip)
 
 
 def _names(robot: Robot, model: Model) -> tuple[str, ...]:
@@ -327,9 +327,9 @@ def _tip(robot: Robot, data: Dataset | None, target: object) -> str | None:
     return with_positions[0]
 
 
-def _parts(asked: FindInfluence, given: _Given, data: Dataset) -> _Parts:
+def _parts(asked: FindInfluence, prepared: _Prepared, data: Dataset) -> _Parts:
     """Split the readings, and put the nominal robot into their frames."""
-    nominal, tip = given.nominal, str(given.tip)
+    nominal, tip = prepared.nominal, str(prepared.tip)
     if not (data.has_position & (data.target == data.targets.index(tip))).any():
         raise InputError("there is no position reading of this target", where=data.source, came=tip)
     count = train_count(asked.train, data.configurations, data.source)
@@ -365,21 +365,21 @@ def _parts(asked: FindInfluence, given: _Given, data: Dataset) -> _Parts:
     return _Parts(place(nominal, alone), alone, others)
 
 
-def _identified(asked: FindInfluence, given: _Given, parts: _Parts) -> Identified:
+def _identified(asked: FindInfluence, prepared: _Prepared, parts: _Parts) -> Identified:
     """Identify the same parameters in every way from the same readings."""
-    nominal, names, tip, first = given.nominal, given.names, str(given.tip), parts.first
+    nominal, names, tip, first = prepared.nominal, prepared.names, str(prepared.tip), parts.first
     units = {n: nominal.parameters[n].prior for n in names if nominal.parameters[n].unit not in ("rad", "m")}
-    how = asked.combination
-    by_norm = minimum_norm(parts.placed, first, names, tip, combination=how, units=units)
+    combination = asked.combination
+    by_norm = minimum_norm(parts.placed, first, names, tip, combination=combination, units=units)
     by_influence = influence_based(
-        parts.placed, first, names, tip, combination=how, units=units, perturbations=given.changes
+        parts.placed, first, names, tip, combination=combination, units=units, perturbations=prepared.changes
     )
     robots: dict[Way, Robot] = {
         "nominal": parts.placed,
         "minimum norm": by_norm.robot,
         "influence": by_influence.robot,
         "least squares": least_squares(parts.placed, first, names, tip),
-        "calibrate": identify(nominal, first, given.model).robot,
+        "calibrate": identify(nominal, first, prepared.model).robot,
     }
     judges = first if parts.second is None else parts.second
     errors = {way: errors_of(robot, judges) for way, robot in robots.items()}
@@ -398,38 +398,41 @@ INFLUENCE_WORSE: Final = Rule(
 )
 
 
-def _compared(found: Identified) -> list[Notice]:
+def _compared(identified: Identified) -> list[Notice]:
     """Say if poses were not met, and which way is the better one."""
-    told = []
-    unmet = int((~found.by_influence.converged).sum())
+    notices = []
+    unmet = int((~identified.by_influence.converged).sum())
     if unmet:
-        told.append(
+        notices.append(
             POSES_UNMET(
-                f"{counted(unmet, 'pose')} of {len(found.by_influence.converged)} could not be met by these parameters:"
-                " their sets are where the steps ended."
+                f"{counted(unmet, 'pose')} of {len(identified.by_influence.converged)} could not be met by these "
+                "parameters: their sets are where the steps ended."
             )
         )
-    by_influence, at_once = (found.errors[way].position for way in ("influence", "least squares"))
+    by_influence, at_once = (identified.errors[way].position for way in ("influence", "least squares"))
     if by_influence is not None and at_once is not None and at_once.mean < by_influence.mean:
-        told.append(
+        notices.append(
             INFLUENCE_WORSE(
                 f"Identification by influence leaves {by_influence.mean * 1e3:.3f} mm, least squares from all poses at "
                 f"once {at_once.mean * 1e3:.3f} mm: one pose sees three combinations of the parameters, and what it "
                 "does not see stays wrong."
             )
         )
-    return told
+    return notices
 
 
 NO_INFLUENCE: Final = Rule("no-influence", "note", "these parameters do not change the pose of the tip anywhere")
 
 
-def _still(made: Influence) -> list[Notice]:
+def _still(influence: Influence) -> list[Notice]:
     """Name parameters that move nothing."""
     still = [
         name
         for name, size, turn in zip(
-            made.names, made.size, made.turn if made.turn is not None else made.size, strict=True
+            influence.names,
+            influence.size,
+            influence.turn if influence.turn is not None else influence.size,
+            strict=True,
         )
         if size.max() < _NOTHING and turn.max() < _NOTHING
     ]

@@ -53,9 +53,9 @@ _SHOWN = 400
 _COLOURS = (BEFORE, "#8a6d1d", "#b3261e", AFTER, "#3b7d3b")
 
 
-def influence_html(found: InfluenceResult) -> str:
+def influence_html(result: InfluenceResult) -> str:
     """Return the page."""
-    rows, tip = found.rows(), found.tip
+    rows, tip = result.rows(), result.tip
     first = rows[0]
     moves = (
         f"On average {tip} moves so far if `{first['name']}`, the most influential parameter, is off by "
@@ -67,23 +67,23 @@ def influence_html(found: InfluenceResult) -> str:
     )
     lead = Lead([Words(moves)], now=significant(first["mean_mm"], 3, 5), unit="mm")
     return Document(
-        f"Influence of the parameters of {found.robot.title}",
+        f"Influence of the parameters of {result.robot.title}",
         [
-            Section("", [lead, *warned(found.notices)], "result"),
+            Section("", [lead, *warned(result.notices)], "result"),
             pictured(
                 "influence",
                 "Influence of each parameter",
                 "Average over the configurations, and range.",
-                influence_figure(found.made),
+                influence_figure(result.made),
             ),
-            pictured("map", "Pose by pose", by_pose, map_figure(found)),
+            pictured("map", "Pose by pose", by_pose, map_figure(result)),
             Section("", [_every_parameter(rows)], "table"),
-            *_identified(found),
+            *_identified(result),
         ],
-        found.command,
-        headline=f"What each parameter of {found.robot.title} does to {tip}",
-        subtitle=f"{len(found.labels)} configurations. Every parameter is changed alone, by what the table says.",
-    ).html(found)
+        result.command,
+        headline=f"What each parameter of {result.robot.title} does to {tip}",
+        subtitle=f"{len(result.labels)} configurations. Every parameter is changed alone, by what the table says.",
+    ).html(result)
 
 
 def _every_parameter(rows: list[dict[str, Any]]) -> Table:
@@ -105,19 +105,19 @@ def _every_parameter(rows: list[dict[str, Any]]) -> Table:
     )
 
 
-def _identified(found: InfluenceResult) -> list[Section]:
+def _identified(result: InfluenceResult) -> list[Section]:
     """Return what identification by influence is worth, where it was tried."""
-    tried = found.identified
+    tried = result.identified
     if tried is None:
         return []
     judged = "configurations that none of them has seen" if tried.held_out else "the same ones"
-    where = (
+    frames_words = (
         "are those that fit the nominal robot best" if tried.frames == "placed" else "are where the robot file has them"
     )
     words = (
         f"From {tried.training} configurations; judged on {judged}. Bars are means, lines reach to where 95 % of the "
         "errors are below. Pose by pose, each pose is explained alone and one set is made of those of all poses. Base "
-        f"and targets {where}, except in the last way."
+        f"and targets {frames_words}, except in the last way."
     )
     spread = [
         (WAYS[way], *(significant(v * 1e3, 3) for v in (s.mean, s.rms, s.p95, s.max)))
@@ -131,7 +131,7 @@ def _identified(found: InfluenceResult) -> list[Section]:
             *(f"{round(row[way], 4) + 0.0:.4f}" for way in WAYS),
             significant(row["deviation"] or 0.0, 2, 6),
         )
-        for row in found.found()
+        for row in result.parameter_rows()
     ]
     return [
         Section(
@@ -154,15 +154,15 @@ def _identified(found: InfluenceResult) -> list[Section]:
     ]
 
 
-def map_figure(found: InfluenceResult) -> Figure:
+def map_figure(result: InfluenceResult) -> Figure:
     """Show the influence of each parameter at each configuration, the most influential at the top."""
-    order = np.argsort(found.made.mean, kind="stable")
-    kept = np.unique(np.linspace(0, len(found.labels) - 1, min(len(found.labels), _SHOWN)).round().astype(int))
+    order = np.argsort(result.made.mean, kind="stable")
+    shown = np.unique(np.linspace(0, len(result.labels) - 1, min(len(result.labels), _SHOWN)).round().astype(int))
     trace = {
         "type": "heatmap",
-        "x": [html.escape(found.labels[at]) for at in kept.tolist()],
-        "y": [html.escape(found.made.names[index]) for index in order.tolist()],
-        "z": [rounded_to(1e3 * found.made.size[index, kept], 4) for index in order.tolist()],
+        "x": [html.escape(result.labels[at]) for at in shown.tolist()],
+        "y": [html.escape(result.made.names[index]) for index in order.tolist()],
+        "z": [rounded_to(1e3 * result.made.size[index, shown], 4) for index in order.tolist()],
         "colorscale": "Viridis",
         "colorbar": {"title": {"text": "mm"}, "thickness": 14},
         "hovertemplate": "%{y} at configuration %{x}: %{z} mm<extra></extra>",
@@ -175,9 +175,9 @@ def map_figure(found: InfluenceResult) -> Figure:
     )
 
 
-def errors_figure(found: Identified) -> Figure:
+def errors_figure(identified: Identified) -> Figure:
     """Show what each way to identify leaves: mean error, with the 95 % below which errors are."""
-    spreads = {way: errors.position for way, errors in found.errors.items() if errors.position is not None}
+    spreads = {way: errors.position for way, errors in identified.errors.items() if errors.position is not None}
     means = np.array([spread.mean for spread in spreads.values()]) * 1e3
     p95 = np.array([spread.p95 for spread in spreads.values()]) * 1e3
     trace = {

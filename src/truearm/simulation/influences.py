@@ -127,14 +127,14 @@ def influence(
 
 
 def sizes_of(
-    robot: Robot, names: Sequence[str], by_unit: Mapping[str, float], given: Mapping[str, float], what: str
+    robot: Robot, names: Sequence[str], by_unit: Mapping[str, float], by_name: Mapping[str, float], quantity: str
 ) -> Array:
     """Return a size for each of the named parameters [m, rad or its own unit], ``(parameters,)``.
 
     Args:
         by_unit: Sizes by SI unit.
-        given: Sizes by parameter name, which come first.
-        what: What the size is, for messages.
+        by_name: Sizes by parameter name, which come first.
+        quantity: What the size is, for messages.
 
     Raises:
         InputError: For a name that is no parameter, occurs twice or has no size, and for a size that is not above zero.
@@ -148,23 +148,23 @@ def sizes_of(
     twice = [name for i, name in enumerate(names) if name in names[:i]]
     if twice:
         raise InputError("a parameter is named twice", where=robot.name, came=twice[0])
-    for name, size in given.items():
+    for name, size in by_name.items():
         if name not in names:
-            raise InputError(f"the {what} is of a parameter that is not named", where=robot.name, came=name)
+            raise InputError(f"the {quantity} is of a parameter that is not named", where=robot.name, came=name)
         if not (math.isfinite(size) and size > 0):
-            raise InputError(f"the {what} is no size", where=name, came=size, allowed="above 0")
+            raise InputError(f"the {quantity} is no size", where=name, came=size, allowed="above 0")
     sizes = []
     for name in names:
         unit = robot.parameters[name].unit
-        if name not in given and unit not in by_unit:
+        if name not in by_name and unit not in by_unit:
             raise InputError(
-                f"the document has no {what} for a parameter of this unit",
+                f"the document has no {quantity} for a parameter of this unit",
                 where=name,
                 came=unit,
                 allowed=", ".join(by_unit),
-                cure=f"Give its {what}.",
+                cure=f"Give its {quantity}.",
             )
-        sizes.append(given[name] if name in given else by_unit[unit])
+        sizes.append(by_name[name] if name in by_name else by_unit[unit])
     return np.array(sizes)
 
 
@@ -284,11 +284,11 @@ def least_squares(robot: Robot, data: Dataset, names: Sequence[str], target: str
     """
     poses = _poses(robot, data, names, target, TOLERANCE, dict.fromkeys(names, 1.0))
     centres = [p.restarted(p.value) for p in (robot.parameters[name] for name in names)]
-    found = robot
+    fitted = robot
     for _ in range(_LOADINGS if robot.bends else 1):
-        free = FreeParameters(tuple(replace(p, value=found.values[p.name]) for p in centres))
-        vector = solve(Problem(found, poses.data, free, {"position": TOLERANCE})).vector
-        found = robot.with_values(dict(zip(names, vector, strict=True)))
+        free = FreeParameters(tuple(replace(p, value=fitted.values[p.name]) for p in centres))
+        vector = solve(Problem(fitted, poses.data, free, {"position": TOLERANCE})).vector
+        fitted = robot.with_values(dict(zip(names, vector, strict=True)))
     return _with_set(robot, names, vector, "least squares over all poses")
 
 
@@ -349,20 +349,20 @@ def _poses(
 
 def positions_of(data: Dataset, target: str) -> Dataset:
     """Return the position readings of one target alone, those in the instrument's own frame."""
-    kept = (data.target == data.targets.index(target)) & data.has_position
+    rows = (data.target == data.targets.index(target)) & data.has_position
     return replace(
         data,
         targets=(target,),
-        configuration=data.configuration[kept],
-        target=np.zeros(int(kept.sum()), dtype=np.intp),
-        position=data.position[kept],
+        configuration=data.configuration[rows],
+        target=np.zeros(int(rows.sum()), dtype=np.intp),
+        position=data.position[rows],
         quaternion=None,
         distance=None,
         height=None,
         fixtures=(),
         fixture=None,
         setup=None,
-        sigma=None if data.sigma is None else data.sigma[kept],
+        sigma=None if data.sigma is None else data.sigma[rows],
         sigma_rot=None,
         visit=None,
         references=None,
@@ -386,8 +386,8 @@ def _result(
         sets = sets + np.where(unmet[:, None], factor * smallest, 0.0)
     left = np.asarray(np.linalg.norm(poses.compared(sets)[0], axis=1))
     combined = _combined(poses, start, sets, combination)
-    made = _with_set(robot, poses.names, combined, f"{len(sets)} poses one at a time, {method}, {combination}")
-    return PoseByPose(made, poses.names, sets, iterations, left, left < tolerance)
+    corrected = _with_set(robot, poses.names, combined, f"{len(sets)} poses one at a time, {method}, {combination}")
+    return PoseByPose(corrected, poses.names, sets, iterations, left, left < tolerance)
 
 
 def _combined(poses: _Poses, start: Array, sets: Array, combination: Combination) -> Array:
@@ -402,9 +402,9 @@ def _combined(poses: _Poses, start: Array, sets: Array, combination: Combination
     return np.asarray(start + scale * along)
 
 
-def _with_set(robot: Robot, names: Sequence[str], vector: Array, how: str) -> Robot:
+def _with_set(robot: Robot, names: Sequence[str], vector: Array, remark: str) -> Robot:
     known = (
         replace(robot.parameters[n], value=float(v), deviation=None, informed=None)
         for n, v in zip(names, vector, strict=True)
     )
-    return replace(robot.with_parameters(known), history=(*robot.history, how), proof=None)
+    return replace(robot.with_parameters(known), history=(*robot.history, remark), proof=None)

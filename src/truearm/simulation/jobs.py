@@ -143,9 +143,9 @@ class FindInfluence(OfRobot, OfModel, Split, Loaded, AlsoIntoFolder, Repeatable,
 
     def run(self) -> InfluenceResult:
         """Find it."""
-        from truearm.simulation.influence import found
+        from truearm.simulation.influence import analysed
 
-        return found(self)
+        return analysed(self)
 
 
 simulate = job(Simulate)

@@ -51,12 +51,12 @@ class Simulation(Record):
     def blocks(self) -> Iterator[Block]:
         """Give what was read."""
         data = self.data
-        what = f"{counted(len(data.target), 'reading')} of {counted(len(data.targets), 'target')}"
+        readings = f"{counted(len(data.target), 'reading')} of {counted(len(data.targets), 'target')}"
         against = f" against {', '.join(data.fixtures)}" if data.fixtures else ""
-        where = "" if self.out is None else f": {self.out}"
+        destination = "" if self.out is None else f": {self.out}"
         many = counted(data.configurations, "configuration")
         yield say(
-            f"{many} of {self.robot} ({self.truth}), {what}{against}{where}",
+            f"{many} of {self.robot} ({self.truth}), {readings}{against}{destination}",
             robot=self.robot,
             truth=self.truth,
             configurations=data.configurations,
@@ -105,9 +105,9 @@ def simulated(asked: Simulate) -> Simulation:
     rng = np.random.default_rng(asked.seed)
     nominal = robot_argument(asked.robot)
     joints_are = joints_argument(asked.joints, nominal)
-    given = not isinstance(asked.poses, int)
-    wanted = configurations_argument(nominal, asked.poses, "poses") if given else None
-    stops = stops_argument(nominal, asked.poses, "poses") if given else None
+    stated = not isinstance(asked.poses, int)
+    wanted = configurations_argument(nominal, asked.poses, "poses") if stated else None
+    stops = stops_argument(nominal, asked.poses, "poses") if stated else None
     with refusals_of("truth"):
         twin = truth_twin(nominal, truth, rng)
     twin = replace(twin, robot=asked.loads.on(twin.robot))

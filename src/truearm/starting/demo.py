@@ -91,8 +91,8 @@ def demonstrated(asked: Demonstrate) -> Demonstration:
     path = folder / "measurements.csv"
     text = csv_text(data)
     plate = (files("truearm.starting.examples") / _PLATE).read_text("utf-8")
-    for name, mine in ((path.name, text), (_PLATE, plate)):
-        if exists(folder / name) and read_bytes(folder / name) != mine.encode():
+    for name, content in ((path.name, text), (_PLATE, plate)):
+        if exists(folder / name) and read_bytes(folder / name) != content.encode():
             raise InputError(
                 "this is another file of that name, and it is not overwritten",
                 parameter="out",

@@ -43,18 +43,18 @@ class MakeStudy(InParts, IntoFolder, Repeatable, Long):
     @classmethod
     def help_text(cls) -> str:
         """Return what the help begins with: it lists the studies, where they are."""
-        told = [
+        paragraphs = [
             "Make a published experiment again and set our figures beside the printed ones, over several seeds.",
             "Writes report.html and study.json into DIR. The studies:",
         ]
         try:
             find_papers()
         except InputError as error:
-            return "\n\n".join([*told, error.message(str)])
+            return "\n\n".join([*paragraphs, error.message(str)])
         from papers import STUDIES
 
-        told += [f"{entry.name}: {entry.about}{' (with `data`)' if entry.files else ''}" for entry in STUDIES]
-        return "\n\n".join(told)
+        paragraphs += [f"{entry.name}: {entry.about}{' (with `data`)' if entry.files else ''}" for entry in STUDIES]
+        return "\n\n".join(paragraphs)
 
     def check(self) -> None:
         """Refuse several who do the seeds."""

@@ -43,20 +43,8 @@ OTHER_ROBOT: Final = Rule(
 OTHER_SETTINGS: Final = Rule(
     "other-settings",
     "warning",
-    "the result was made with another model, training part, seed, loss, payload or gravity than are chosen; one of "
-    "tests with another alignment, comparison or noise",
-)
-OTHER_MEASUREMENTS: Final = Rule(
-    "other-measurements",
-    "warning",
-    "the result is of other measurements than those that are chosen, or they were changed, or one of tests does not "
-    "say of which",
-)
-OTHER_PLAN: Final = Rule(
-    "other-plan",
-    "warning",
-    "the result is of another plan of tests than the one that is chosen, or that was changed; or plan or result is "
-    "of another robot",
+    "the result or the plan that stands there was made with other settings, measurements or files than are chosen, "
+    "such as another model, seed, payload or plan of tests; or files have changed since, or it does not tell",
 )
 
 
@@ -77,13 +65,13 @@ def other_evaluations(result: ResultFile | None, project: Project, robot: Robot)
             "This result does not say which files it is of, as it was written by an older version: whether they are "
             "those that are chosen cannot be told. Evaluate them again."
         )
-        notices.append(OTHER_MEASUREMENTS(text))
+        notices.append(OTHER_SETTINGS(text))
         if plan is not None and not is_of_plan(result, plan):
-            notices.append(OTHER_PLAN("This result is of another plan than the one that is chosen."))
+            notices.append(OTHER_SETTINGS("This result is of another plan than the one that is chosen."))
     else:
         plans = [*_other_files(("plan",), result.inputs, project)] or [*_other_robot_file(result.inputs, project)]
-        notices += _told(OTHER_PLAN, "was evaluated by", plans)
-        notices += _told(OTHER_MEASUREMENTS, "is of", [*_other_files(_MEASURED, result.inputs, project)])
+        notices += _told("was evaluated by", plans)
+        notices += _told("is of", [*_other_files(_MEASURED, result.inputs, project)])
         pairs += _other_files(_HOW, result.inputs, project)
     instrument = result.instrument
     if instrument is not None and not (
@@ -91,7 +79,7 @@ def other_evaluations(result: ResultFile | None, project: Project, robot: Robot)
     ):
         then = _noise(instrument.sigma_mm, instrument.sigma_rot_deg)
         pairs.append((then, _noise(files.noise_mm, files.noise_rot_deg)))
-    return [*notices, *_told(OTHER_SETTINGS, "was made with", pairs)]
+    return [*notices, *_told("was made with", pairs)]
 
 
 def stamps_of(project: Project) -> tuple[Any, ...]:
@@ -120,7 +108,7 @@ def _other_robot(
     for name, things in of.items():
         are = "are" if len(things) > 1 else "is"
         text = f"{' and '.join(things)} {are} of the robot {name}, and {now} is chosen."
-        found.append(OTHER_PLAN(text[0].upper() + text[1:]))
+        found.append(OTHER_SETTINGS(text[0].upper() + text[1:]))
     return found
 
 
@@ -159,11 +147,11 @@ def _changed(name: str, then: ReadFile, now: str, path: Path, folder: Path) -> I
         yield f"{name} {then.file}", f"{name} {now}"
 
 
-def _told(rule: Rule, verb: str, pairs: list[tuple[str, str]]) -> list[Notice]:
+def _told(verb: str, pairs: list[tuple[str, str]]) -> list[Notice]:
     if not pairs:
         return []
     was, is_now = ("; ".join(pair[k] for pair in pairs) for k in (0, 1))
-    return [rule(f"This result {verb} {was}. Chosen now: {is_now}. Evaluate again.")]
+    return [OTHER_SETTINGS(f"This result {verb} {was}. Chosen now: {is_now}. Evaluate again.")]
 
 
 def _plan(project: Project, name: str) -> PerformancePlan | None:

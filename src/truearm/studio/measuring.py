@@ -118,7 +118,7 @@ class Measuring:
         entries: list[Entry] = []
         for _ in range(most if self.is_virtual else 1):
             entries += self.campaign.step(most=most)
-        return tuple(entries), self.campaign.source.told()
+        return tuple(entries), self.campaign.source.messages()
 
     def finish(self) -> Measured:
         """Write measurements and report as the command does in the project's folder, and return what came of it."""
@@ -133,8 +133,10 @@ class Measuring:
     def measured(self) -> Measured:
         """Return what came of it so far; places are named as they are called in the folder."""
         here, found = f"{self._project.folder}/", self.campaign.measured()
-        told = tuple(Notice(one.code, one.message.replace(here, ""), one.level) for one in found.told)
-        return replace(found, plan=self.fields.planned(), instrument=found.instrument.replace(here, ""), told=told)
+        told = tuple(Notice(one.code, one.message.replace(here, ""), one.level) for one in found.measuring_notices)
+        return replace(
+            found, plan=self.fields.planned(), instrument=found.instrument.replace(here, ""), measuring_notices=told
+        )
 
     def with_what_is_said_now(self) -> None:
         """Open it again if the file of serial numbers and air is another one, or was changed since."""

@@ -169,10 +169,10 @@ class _Points:
         self.predicted, self.measured = (
             (points - points.mean(axis=1, keepdims=True)) / width for points in (predicted, measured)
         )
-        u, w, one = self.predicted - self.measured, self.predicted + self.measured, np.ones(measured.shape[1])
+        u, w, ones = self.predicted - self.measured, self.predicted + self.measured, np.ones(measured.shape[1])
         both, every = (u * w).sum(axis=0), (u**2 + w**2).sum(axis=0)
-        self.numerator = np.stack([*u, *w, both, one], axis=1), np.stack([*-w, *-u, one, both])
-        self.squares = np.stack([*u, *w, every, one], axis=1), np.stack([*(-2.0 * u), *(-2.0 * w), one, every])
+        self.numerator = np.stack([*u, *w, both, ones], axis=1), np.stack([*-w, *-u, ones, both])
+        self.squares = np.stack([*u, *w, every, ones], axis=1), np.stack([*(-2.0 * u), *(-2.0 * w), ones, every])
         extent, most = (2.0 * float(np.linalg.norm(points, axis=0).max()) for points in (w, u))
         self.close = max(_CLOSE * extent, 2.0 * _ERRORS * most) ** 2
 
@@ -190,7 +190,7 @@ class _Tally:
         blocks = [block for group in groups for block in group]
         most = max((rows.stop - rows.start) * (columns.stop - columns.start) for rows, columns, _ in blocks)
         self._points = points
-        self._room = np.empty((3, most))
+        self._buffer = np.empty((3, most))
         self._single = np.empty((3, most), dtype=np.float32)
         self._bins = np.zeros(most, dtype=np.uint8)
         self._twos = np.zeros(2**16, dtype=np.int64)
@@ -206,7 +206,7 @@ class _Tally:
             sums = self._by_products(rows, columns)
             if sums is not None:
                 return sums
-        error, other, spare = self._shaped(self._room, rows, columns)
+        error, other, spare = self._shaped(self._buffer, rows, columns)
         _distances(self._points.predicted, rows, columns, error, spare)
         error -= _distances(self._points.measured, rows, columns, other, spare)
         flat = error.reshape(-1) if counted is None else error[counted]
@@ -221,10 +221,10 @@ class _Tally:
     def _by_products(self, rows: slice, columns: slice) -> tuple[float, float] | None:
         """Do so by two matrix products, or return None if too many pairs are close."""
         points = self._points
-        numerator, squares, _ = self._shaped(self._room, rows, columns)
+        numerator, squares, _ = self._shaped(self._buffer, rows, columns)
         for (left, right), product in ((points.numerator, numerator), (points.squares, squares)):
             np.matmul(left[rows], right[:, columns], out=product)
-        error, square, spare = (room.reshape(-1) for room in self._shaped(self._single, rows, columns))
+        error, square, spare = (buffer.reshape(-1) for buffer in self._shaped(self._single, rows, columns))
         np.copyto(error, numerator.reshape(-1), casting="same_kind")
         np.copyto(square, squares.reshape(-1), casting="same_kind")
         close = np.flatnonzero(square < points.close)
@@ -267,10 +267,10 @@ class _Tally:
         np.add.at(self._twos, numbers.view(np.uint16), 1)
 
     @staticmethod
-    def _shaped(rooms: NDArray[_F], rows: slice, columns: slice) -> tuple[NDArray[_F], NDArray[_F], NDArray[_F]]:
+    def _shaped(buffers: NDArray[_F], rows: slice, columns: slice) -> tuple[NDArray[_F], NDArray[_F], NDArray[_F]]:
         """Return three arrays for a block."""
         shape = (rows.stop - rows.start, columns.stop - columns.start)
-        first, second, third = (room[: shape[0] * shape[1]].reshape(shape) for room in rooms)
+        first, second, third = (buffer[: shape[0] * shape[1]].reshape(shape) for buffer in buffers)
         return first, second, third
 
 
@@ -302,27 +302,27 @@ class Distances(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give the statistics and a histogram, in mm."""
-        found, edges = self.errors, self._edges()
-        figures = {"mean": found.mean * 1e3, "deviation": found.deviation * 1e3, "max": found.maximum * 1e3}
+        errors, edges = self.errors, self._edges()
+        figures = {"mean": errors.mean * 1e3, "deviation": errors.deviation * 1e3, "max": errors.maximum * 1e3}
         yield say(
-            f"{counted(found.pairs, 'distance')} between points of {counted(self.configurations, 'configuration')} of "
+            f"{counted(errors.pairs, 'distance')} between points of {counted(self.configurations, 'configuration')} of "
             f"{self.source}:",
             f"  {'  '.join(f'{name} {value:.3f}' for name, value in figures.items())} mm",
-            f"  {100 * found.positive:.0f} % of the predicted distances are too long",
+            f"  {100 * errors.positive:.0f} % of the predicted distances are too long",
             configurations=self.configurations,
-            pairs=found.pairs,
+            pairs=errors.pairs,
             distance_mm=figures,
-            positive=found.positive,
+            positive=errors.positive,
         )
-        step = max(1, len(found.counts) // _BARS)
-        starts = range(0, len(found.counts), step)
-        sums = [int(found.counts[first : first + step].sum()) for first in starts]
-        ends = [edges[min(first + step, len(found.counts))] for first in starts]
+        step = max(1, len(errors.counts) // _BARS)
+        starts = range(0, len(errors.counts), step)
+        sums = [int(errors.counts[first : first + step].sum()) for first in starts]
+        ends = [edges[min(first + step, len(errors.counts))] for first in starts]
         bars = [
             f"  {edges[first]:8.3f} to {end:8.3f} mm  {'#' * round(_LONGEST * count / max(sums))}".rstrip()
             for first, end, count in zip(starts, ends, sums, strict=True)
         ]
-        yield detail(*bars, histogram={"edges_mm": edges, "counts": found.counts.tolist()})
+        yield detail(*bars, histogram={"edges_mm": edges, "counts": errors.counts.tolist()})
 
     def _edges(self) -> list[float]:
         edges: list[float] = np.round(self.errors.edges * 1e3, 9).tolist()
@@ -337,5 +337,5 @@ def judged(asked: JudgeDistances) -> Distances:
     seen = readings.has_position
     measured = readings.position[seen]
     with refusals_of("data"):
-        found = pair_distances(measured + predicted[seen], measured, readings.configuration[seen])
-    return Distances(readings.source, readings.configurations, found, parts_of((arm, readings)))
+        errors = pair_distances(measured + predicted[seen], measured, readings.configuration[seen])
+    return Distances(readings.source, readings.configurations, errors, parts_of((arm, readings)))

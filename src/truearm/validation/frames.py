@@ -66,9 +66,9 @@ def check_proof(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
         return []
     plain = replace(data, sigma=None, sigma_rot=None, quaternion=None, setup=None)
     problem = Problem(robot, plain, free, {observation.name: 1.0 for observation in OBSERVATIONS})
-    here = problem.at(np.array([robot.values[name] for name in free.names]))
-    by_model = here.jacobian @ proof.root
-    by_joints = here.by_joints * np.array(proof.joint_error)
+    evaluation = problem.at(np.array([robot.values[name] for name in free.names]))
+    by_model = evaluation.jacobian @ proof.root
+    by_joints = evaluation.by_joints * np.array(proof.joint_error)
     count = max(int(data.has_position.sum()), 1)
     model = float(np.sum(by_model**2) + np.sum(by_joints**2)) / count
     sigma = np.full(len(data.target), _NOISE) if data.sigma is None else data.sigma
@@ -123,9 +123,9 @@ def check_frames(robot: Robot, data: Dataset, errors: Errors, known: Moved | Non
     if not beyond and _rms(off) <= _USUAL * _of_joint_errors(robot, data):
         return []
     if len(np.unique(data.configuration[data.has_reading])) >= _FEWEST:
-        told = _moved(robot, data, off, known, reach, beyond=beyond)
-        if told is not None:
-            return [told]
+        notice = _moved(robot, data, off, known, reach, beyond=beyond)
+        if notice is not None:
+            return [notice]
     if not beyond:
         return []
     return [
@@ -184,7 +184,7 @@ def _moved(
     robot: Robot, data: Dataset, off: Array, known: Moved | None, reach: float, *, beyond: bool
 ) -> Notice | None:
     """Return what explains the errors, None if no motion does."""
-    found: dict[Moved, tuple[Refit, float]] = {}
+    refits: dict[Moved, tuple[Refit, float]] = {}
     kinds: tuple[Moved, ...] = ("base", "tool", "targets")
     for kind in kinds:
         if kind == known:
@@ -193,17 +193,17 @@ def _moved(
             again = refit(robot, data, kind)
         except InputError:
             continue  # the readings are too few for this one
-        found[kind] = again, _rms(_sizes(again.errors))
+        refits[kind] = again, _rms(_sizes(again.errors))
     limit = min(_rms(off) / _LEAST_IMPROVEMENT, LARGEST_SHARE_LEFT * min(reach, _extent(data)))
-    if "tool" in found and "targets" in found:
+    if "tool" in refits and "targets" in refits:
         # The motion of a rigid tool is the simpler one: single targets must explain far more.
-        single = found["targets"][1] * _ALIKE < found["tool"][1]
-        found.pop("tool" if single else "targets")
-    if not found:
+        single = refits["targets"][1] * _ALIKE < refits["tool"][1]
+        refits.pop("tool" if single else "targets")
+    if not refits:
         return None
-    best = min(found, key=lambda kind: found[kind][1])
-    again, left = found[best]
-    alike = [kind for kind, (_, other) in found.items() if kind != best and other <= _ALIKE * left and other <= limit]
+    best = min(refits, key=lambda kind: refits[kind][1])
+    again, left = refits[best]
+    alike = [kind for kind, (_, other) in refits.items() if kind != best and other <= _ALIKE * left and other <= limit]
     if left > limit:
         both = math.inf if known is not None else _left_with_both(robot, data, len(off))
         if both > limit:
@@ -215,7 +215,7 @@ def _moved(
     other = "instrument or base" if alike and alike[0] == "base" else "tool"
     doubt = (
         f" These configurations do not tell that from a moved {other}: "
-        f"`refit={alike[0]}` would leave {millimetres(found[alike[0]][1])} mm."
+        f"`refit={alike[0]}` would leave {millimetres(refits[alike[0]][1])} mm."
         if alike
         else ""
     )
@@ -273,8 +273,8 @@ def _both_moved(left: float, off: Array, *, beyond: bool) -> Notice:
 def _motion(again: Refit) -> str:
     """Return in words how far something moved."""
     turned = "" if again.turn is None else f" and turned by {degrees(again.turn)} deg"
-    what = "at their middle" if again.moved == "base" else "at the middle of its targets"
-    return f"moved by {millimetres(again.shift)} mm {what}{turned} as a whole"
+    middle = "at their middle" if again.moved == "base" else "at the middle of its targets"
+    return f"moved by {millimetres(again.shift)} mm {middle}{turned} as a whole"
 
 
 #: Targets that are off by less need no explanation [m].
@@ -310,12 +310,12 @@ def check_names(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
     places = {name: robot.world_poses(data.postures, name)[0] for name in known}
     meant = {}
     for t, name in enumerate(data.targets):
-        mine = np.flatnonzero(read & (data.target == t))
-        if not len(mine):
+        rows = np.flatnonzero(read & (data.target == t))
+        if not len(rows):
             continue
         off = {
             other: float(
-                np.median(np.linalg.norm(places[other][data.configuration[mine]] - data.position[mine], axis=1))
+                np.median(np.linalg.norm(places[other][data.configuration[rows]] - data.position[rows], axis=1))
             )
             for other in known
         }

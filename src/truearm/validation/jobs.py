@@ -52,8 +52,8 @@ class _OneOrEach(Numbers):
 
     def read(self, typed: Any, name: str) -> Any:
         """Return a single one as a number."""
-        found = super().read(typed, name)
-        return found[0] if len(found) == 1 else found
+        values = super().read(typed, name)
+        return values[0] if len(values) == 1 else values
 
     def typed_again(self, value: Any) -> list[str]:
         """Return them with commas between."""

@@ -90,8 +90,8 @@ def inverted(robot: Robot) -> Robot:
             JOINT: math.atan2(-M[0, 1], M[0, 0]) + zero.nominal,
         }
         joints.append(replace(joint, row=row))
-    made = replace(robot, convention_name="translations", joints=tuple(joints), known={}, effect_names=(), truths={})
-    return made.with_frames(IDENTITY, {})
+    arm = replace(robot, convention_name="translations", joints=tuple(joints), known={}, effect_names=(), truths={})
+    return arm.with_frames(IDENTITY, {})
 
 
 def fake_targets(robot: Robot, joints: Array) -> FakeTargets:
@@ -118,10 +118,10 @@ def _checked(robot: Robot) -> Robot:
 
 
 def _about_z(angle: float) -> Array:
-    made = np.eye(4)
-    made[0, 0] = made[1, 1] = math.cos(angle)
-    made[1, 0], made[0, 1] = math.sin(angle), -math.sin(angle)
-    return made
+    matrix = np.eye(4)
+    matrix[0, 0] = matrix[1, 1] = math.cos(angle)
+    matrix[1, 0], matrix[0, 1] = math.sin(angle), -math.sin(angle)
+    return matrix
 
 
 # The line test before and after compensation, on a twin or from data (KR5 paper, section 4.2 and equation 21).
@@ -158,8 +158,8 @@ def on_twin(
     base = twin.robot.base
     base_frame = np.eye(4)
     base_frame[:3, :3], base_frame[:3, 3] = base.rotation, base.translation
-    rest = _flange_of(twin, joints)
-    true = np.array([(np.linalg.inv(base_frame) @ T)[:3, 3] for T in rest])
+    flange = _flange_of(twin, joints)
+    true = np.array([(np.linalg.inv(base_frame) @ T)[:3, 3] for T in flange])
     seen = true + rng.normal(0.0, 1.0, (repeats, *true.shape)) * scatter
     return LineErrors(lines, np.asarray(np.linalg.norm(seen - lines.position, axis=2).mean(axis=0)))
 
@@ -238,9 +238,9 @@ class LineTest(Record):
 
     def written_at(self, out: str) -> str:
         """Return the line that says which file holds the joint positions."""
-        said = "compensated" if self.compensated else "nominal"
+        kind = "compensated" if self.compensated else "nominal"
         shown = " as the controller shows them (axis_i)" if self.joints_are == "controller" else ""
-        return f"{out}: {len(self.joints)} configurations, {said} joint positions{shown}."
+        return f"{out}: {len(self.joints)} configurations, {kind} joint positions{shown}."
 
     def _line(self, direction: str, before: LineErrors) -> Words:
         figures = before.figures(direction)

@@ -186,12 +186,12 @@ def region_distances(robot: Robot, data: Dataset, errors: Errors) -> RegionDista
     tip, middle = np.empty(len(reading)), np.empty(len(reading))
     for index in np.unique(data.target[reading]).tolist():
         known = robot.forward(training, target=data.targets[index])[0]
-        mine = np.flatnonzero(data.target[reading] == index)
-        places = robot.forward(data.postures, target=data.targets[index])[0][data.configuration[reading[mine]]]
-        for part in np.array_split(np.arange(len(mine)), -(-len(mine) // _ROWS)):
+        rows = np.flatnonzero(data.target[reading] == index)
+        places = robot.forward(data.postures, target=data.targets[index])[0][data.configuration[reading[rows]]]
+        for part in np.array_split(np.arange(len(rows)), -(-len(rows) // _ROWS)):
             apart = places[part][:, None] - known
-            tip[mine[part]] = np.sqrt(np.einsum("nkx,nkx->nk", apart, apart).min(axis=1))
-        middle[mine] = np.linalg.norm(places - known.mean(axis=0), axis=1)
+            tip[rows[part]] = np.sqrt(np.einsum("nkx,nkx->nk", apart, apart).min(axis=1))
+        middle[rows] = np.linalg.norm(places - known.mean(axis=0), axis=1)
     return RegionDistances(
         reading,
         norms[reading],
@@ -208,32 +208,32 @@ def _of_postures(robot: Robot, joints: Array, training: Array) -> Array:
     turning = [i for i, joint in enumerate(robot.joints) if joint.kind == "revolute"]
     if not turning:
         return np.full(len(joints), np.nan)
-    found = np.empty(len(joints))
+    distances = np.empty(len(joints))
     for part in np.array_split(np.arange(len(joints)), -(-len(joints) // _ROWS)):
         apart = joints[part][:, None, turning] - training[:, turning]
-        found[part] = np.abs((apart + np.pi) % (2.0 * np.pi) - np.pi).max(axis=2).min(axis=1)
-    return found
+        distances[part] = np.abs((apart + np.pi) % (2.0 * np.pi) - np.pi).max(axis=2).min(axis=1)
+    return distances
 
 
 #: The parts of an orientation error, by their names.
 PARTS: Final = ("rx", "ry", "rz", "phi", "theta", "psi")
 
 
-def orientation_block(found: OrientationErrors) -> Words:
+def orientation_block(errors: OrientationErrors) -> Words:
     """Return orientation errors by their parts, in deg: the mean size of each, and in JSON the other figures."""
-    parts = found.parts
+    parts = errors.parts
     sizes = {name: "–" if part is None else f"{part['mean_size']:.4f}" for name, part in parts.items()}
     vector = "  ".join(f"{name} {sizes[name]}" for name in PARTS[:3])
     angles = "  ".join(f"{name.capitalize()} {sizes[name]}" for name in PARTS[3:])
-    left_out = f" (Phi and Psi without {found.locked} readings near Theta 0 or 180)" if found.locked else ""
+    left_out = f" (Phi and Psi without {errors.locked} readings near Theta 0 or 180)" if errors.locked else ""
     return detail(
         "  orientation, mean sizes in the base frame: "
         f"rotation vector  {vector} deg; ZXZ angles  {angles} deg{left_out}",
         orientation_parts_deg={
-            "readings": len(found.reading),
+            "readings": len(errors.reading),
             "rotation_vector": {name: parts[name] for name in PARTS[:3]},
             "zxz": {name: parts[name] for name in PARTS[3:]},
-            "zxz_left_out": found.locked,
+            "zxz_left_out": errors.locked,
         },
     )
 
@@ -251,12 +251,12 @@ def _figures(values: Array) -> dict[str, float] | None:
     }
 
 
-def distance_block(found: RegionDistances) -> Words:
+def distance_block(distances: RegionDistances) -> Words:
     """Return how far readings lie from where the robot was calibrated, and what the error does, in mm and deg."""
-    growth = found.growth
-    away = f"{found.tip.min() * 1e3:.0f} to {found.tip.max() * 1e3:.0f} mm"
-    turned = np.degrees(found.joints[np.isfinite(found.joints)])
-    words = f"From the nearest of {found.training} training configurations: tips {away}"
+    growth = distances.growth
+    away = f"{distances.tip.min() * 1e3:.0f} to {distances.tip.max() * 1e3:.0f} mm"
+    turned = np.degrees(distances.joints[np.isfinite(distances.joints)])
+    words = f"From the nearest of {distances.training} training configurations: tips {away}"
     if len(turned):
         words += f", joints {turned.min():.0f} to {turned.max():.0f} deg"
     if growth is not None:
@@ -265,10 +265,10 @@ def distance_block(found: RegionDistances) -> Words:
     return say(
         words,
         distance_from_training={
-            "training_configurations": found.training,
-            "tip_mm": [_span(span, 1e3) for span in found.spans(found.tip)],
-            "joints_deg": [_span(span, math.degrees(1.0)) for span in found.spans(found.joints)],
-            "middle_mm": [_span(span, 1e3) for span in found.spans(found.middle)],
+            "training_configurations": distances.training,
+            "tip_mm": [_span(span, 1e3) for span in distances.spans(distances.tip)],
+            "joints_deg": [_span(span, math.degrees(1.0)) for span in distances.spans(distances.joints)],
+            "middle_mm": [_span(span, 1e3) for span in distances.spans(distances.middle)],
             "grows": None if growth is None else growth[2],
         },
     )

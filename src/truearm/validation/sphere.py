@@ -21,7 +21,7 @@ from truearm.engine.command.arguments import (
     refuse_swapped,
     robot_argument,
 )
-from truearm.engine.command.split import changed_since, told_of
+from truearm.engine.command.split import changed_since, faults_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.document.document import Block, each, say
 from truearm.engine.document.records import Record
@@ -31,6 +31,7 @@ from truearm.engine.robot.chain import Array
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY
+from truearm.validation.validate import refuse_unknown
 
 if TYPE_CHECKING:
     from truearm.validation.jobs import JudgeSphere
@@ -222,9 +223,7 @@ def judged(asked: JudgeSphere) -> SphereTests:
         )
     if asked.tip is not None:
         arm = arm.with_frames(arm.base, dict.fromkeys(measured.targets, asked.tip))
-    with refusals_of("data"):
-        for name in measured.targets:
-            arm.target(name)
+    refuse_unknown(measured, measured.targets, arm.target)
     at_ball = None if asked.taught_at is None else _taught(measured, asked.taught_at)
     sphere_tests = SphereTests(
         arm,
@@ -232,7 +231,7 @@ def judged(asked: JudgeSphere) -> SphereTests:
         _spheres(arm, measured, at_ball),
         asked.taught_at,
         asked.again,
-        (*changed_since(asked.robot), *told_of(arm)),
+        (*changed_since(asked.robot), *faults_of(arm)),
         files_of(asked.robot, asked.data),
         parts_of((arm, measured)),
     )

@@ -44,11 +44,11 @@ def sphere_page(tests: SphereTests) -> str:
     ).html(tests)
 
 
-def _errors(one: OneSphere) -> Figure:
+def _errors(sphere: OneSphere) -> Figure:
     traces = []
-    if one.before is not None:
-        traces.append(_trace("nominal", one.before, BEFORE))
-    traces.append(_trace("calibrated" if one.before is not None else "this robot", one.after, AFTER))
+    if sphere.before is not None:
+        traces.append(_trace("nominal", sphere.before, BEFORE))
+    traces.append(_trace("calibrated" if sphere.before is not None else "this robot", sphere.after, AFTER))
     return figure(traces, 340, xaxis=axis("reading"), yaxis=axis("error of the distance [mm]"))
 
 

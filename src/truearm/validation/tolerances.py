@@ -122,7 +122,7 @@ class UsedTolerances(Record):
         """Give what each joint uses, in mm and deg."""
         yield say(robot=self.robot)
         heading = ("joint", "depth [mm]", "lean [mm]", "towards [deg]", "position x, y, z [mm]")
-        held: list[dict[str, Any]] = [
+        entries: list[dict[str, Any]] = [
             {
                 "joint": number,
                 "depth_mm": depth * 1e3,
@@ -141,9 +141,9 @@ class UsedTolerances(Record):
                 ),
                 ", ".join(f"{v:.4f}" for v in row["position_mm"]),
             )
-            for row in held
+            for row in entries
         ]
-        yield Table(heading, rows, held={"joints": held})
+        yield Table(heading, rows, in_json={"joints": entries})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -178,7 +178,7 @@ class AllowedErrors(Record):
                 for i, (angle, lean, place) in enumerate(of_joints, 1)
             ),
         )
-        worst, root = (one * 1e3 for one in self.errors.together)
+        worst, root = (error * 1e3 for error in self.errors.together)
         yield say(
             f"  all at their worst {worst:.3f} mm, root of the sum of squares {root:.3f} mm",
             together={"worst_mm": worst, "root_of_squares_mm": root},
@@ -206,5 +206,5 @@ def judged(asked: JudgeTolerance) -> UsedTolerances | AllowedErrors:
         errors = robot if robot.convention_name == CONVENTION else converted(robot, CONVENTION)
     q = robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
     angles = tuple(errors_of_tolerance(a, 0.0, d)[0] for a, d in zip(leans, depths, strict=True))
-    found = flange_error(errors, angles, positions, q)
-    return AllowedErrors(robot.name, len(q), angles, found, robot.simulated_from)
+    error = flange_error(errors, angles, positions, q)
+    return AllowedErrors(robot.name, len(q), angles, error, robot.simulated_from)

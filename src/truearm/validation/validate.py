@@ -8,7 +8,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from truearm.engine.base.errors import InputError, Notice, Rule, counted, has_error, refusals_of
+from truearm.engine.base.errors import (
+    InputError,
+    Notice,
+    Rule,
+    counted,
+    has_error,
+    name_parameter,
+    name_place,
+    refusals_of,
+)
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.manifest import hash_of, sets_in
 from truearm.engine.base.writing import output_folder, write_files
@@ -125,7 +134,7 @@ class Validation(Record):
         if self.refit is not None:
             yield refit_block(self.refit)
         if self.notes:
-            yield say(*(f"{name}: {said}" for name, said in self.notes.items()), notes=self.notes)
+            yield say(*(f"{name}: {note}" for name, note in self.notes.items()), notes=self.notes)
 
     @staticmethod
     def folder(out: str | Path, inputs: Iterable[Path] = (), parameter: str = "folder") -> Path:
@@ -164,7 +173,7 @@ class Validation(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class _Given:
+class _Read:
     robot: Robot  #: With what it carried, and what acted on it.
     as_calibrated: Robot  #: With what acts on it, and the loads of its file.
     data: Dataset
@@ -189,33 +198,33 @@ def validated(asked: Validate) -> Validation:
     zoned = zoned_robot(asked.robot)
     inputs = files_of(asked.robot, asked.data)
     folder = None if asked.out is None else Validation.folder(asked.out, inputs, "out")
-    given = _read(asked, zoned)
-    _refuse_unplaced(asked, given)
-    judged = _judged(asked, given)
+    read = _read(asked, zoned)
+    _refuse_unplaced(asked, read)
+    judged = _judged(asked, read)
     errors, of_zones = judged.errors, None
     if zoned is not None:
-        errors = zoned.errors(given.robot, given.data)
-        of_zones = zoned.means(given.data, errors)
+        errors = zoned.errors(read.robot, read.data)
+        of_zones = zoned.means(read.data, errors)
     warnings = (
-        *given.notices,
+        *read.notices,
         *judged.mistaken,
-        *given.other_session,
-        *check_payload(given.robot),
-        *check_force([(given.robot, given.data.postures)]),
-        *_seen_in_training(given.robot, given.data, given.digest),
+        *read.other_session,
+        *check_payload(read.robot),
+        *check_force([(read.robot, read.data.postures)]),
+        *_seen_in_training(read.robot, read.data, read.digest),
     )
-    distances = region_distances(judged.robot, given.data, errors)
+    distances = region_distances(judged.robot, read.data, errors)
     validation = Validation(
-        source=given.data.source,
+        source=read.data.source,
         errors=errors,
         warnings=warnings,
         refit=judged.refit,
         notes=dict(asked.notes or {}),
-        orientations=orientation_errors(judged.robot, given.data, errors),
+        orientations=orientation_errors(judged.robot, read.data, errors),
         distances=distances,
         next=() if has_error(warnings) else measure_farther(distances),
         robot=judged.robot,
-        data=given.data,
+        data=read.data,
         zones=of_zones,
         command=asked.again,
         inputs=inputs,
@@ -225,7 +234,7 @@ def validated(asked: Validate) -> Validation:
     return validation
 
 
-def _read(asked: Validate, zoned: ZonedRobot | None) -> _Given:
+def _read(asked: Validate, zoned: ZonedRobot | None) -> _Read:
     """Read robot and data, the former with its loads."""
     digest, named = None, asked.robot
     if isinstance(asked.data, str | Path):
@@ -247,15 +256,15 @@ def _read(asked: Validate, zoned: ZonedRobot | None) -> _Given:
     robot = _pushed(robot, data, pushed, asked.wrench_at)
     data, other_session = _of_another_session(robot, data)
     as_calibrated = as_calibrated.with_wrench(robot.wrench)
-    return _Given(robot, as_calibrated, data, digest, tuple(changed), tuple(other_session))
+    return _Read(robot, as_calibrated, data, digest, tuple(changed), tuple(other_session))
 
 
-def _refuse_unplaced(asked: Validate, given: _Given) -> None:
+def _refuse_unplaced(asked: Validate, read: _Read) -> None:
     """Refuse readings in the frame of an instrument that nobody knows the place of."""
-    robot, data = given.robot, given.data
+    robot, data = read.robot, read.data
     identified = {p.group for p in robot.parameters.values() if p.deviation is not None}
-    found_or_held = "base" in identified or (robot.proof is not None and BASE in robot.proof.held)
-    if asked.refit != "base" and data.anchored and robot.fixtures and identified and not found_or_held:
+    is_placed = "base" in identified or (robot.proof is not None and BASE in robot.proof.held)
+    if asked.refit != "base" and data.anchored and robot.fixtures and identified and not is_placed:
         raise InputError(
             "the robot was calibrated without the frame of an instrument, so the place of this instrument is unknown",
             parameter="data",
@@ -265,26 +274,26 @@ def _refuse_unplaced(asked: Validate, given: _Given) -> None:
         )
 
 
-def _judged(asked: Validate, given: _Given) -> _Judged:
+def _judged(asked: Validate, read: _Read) -> _Judged:
     """Return the errors, of what is found anew if something moved, and what speaks against them."""
-    data, moved = given.data, asked.refit
-    errors, found = errors_of(given.robot, data), None
-    judged, mistaken = given.robot, list[Notice]()
+    data, moved = read.data, asked.refit
+    errors, refit = errors_of(read.robot, data), None
+    judged, mistaken = read.robot, list[Notice]()
     if moved is not None:
         # Names that were exchanged would pass for targets that moved.
         mistaken = [] if moved == "base" else check_names(judged, data, errors)
         with refusals_of("refit"):
-            found = find_moved(judged, data, moved)
-        judged, errors = found.robot, found.errors
+            refit = find_moved(judged, data, moved)
+        judged, errors = refit.robot, refit.errors
     # Configurations that decide much alone err more without themselves: that is no sign of anything else.
-    agreed = errors if found is None else errors_of(judged, data)
+    agreed = errors if refit is None else errors_of(judged, data)
     mistaken = (
         mistaken
         or check_names(judged, data, agreed)
         or check_frames(judged, data, agreed, moved)
-        or check_proof(given.as_calibrated, data, agreed)
+        or check_proof(read.as_calibrated, data, agreed)
     )
-    return _Judged(judged, errors, found, tuple(mistaken))
+    return _Judged(judged, errors, refit, tuple(mistaken))
 
 
 OTHER_SESSION: Final = Rule(
@@ -339,9 +348,11 @@ def _seen_in_training(robot: Robot, data: Dataset, digest: str | None) -> list[N
         return []
     (count, used, _), left_out = training.split, training.left_out
     of = used + left_out
-    rest = f"; {left_out} were left out" if left_out else ""
+    beside = f"; {left_out} were left out" if left_out else ""
     held_out = (
-        f"{rest}; the rest was held out, and its errors are in the result of the calibration" if used > count else rest
+        f"{beside}; the rest was held out, and its errors are in the result of the calibration"
+        if used > count
+        else beside
     )
     return [
         TRAINING_DATA(
@@ -370,13 +381,21 @@ def as_measured(robot: object, data: object, loads: Loads) -> tuple[Robot, Datas
             where=data.source,
             cure="Add the column temperature [degC].",
         )
-    with refusals_of("data"):
-        for name in data.targets:
-            robot.target(name)
-        for name in data.fixtures:
-            robot.fixture(name)
+    refuse_unknown(data, data.targets, robot.target)
+    refuse_unknown(data, data.fixtures, robot.fixture)
     if not data.has_reading.any():
         raise InputError(
             "there is no reading", parameter="data", where=data.source, cure="Fill in x, y and z, or distance."
         )
     return robot, data
+
+
+def refuse_unknown(data: Dataset, names: Iterable[str], look_up: Callable[[str], object]) -> None:
+    """Refuse data that name what the robot does not have: its method `look_up` refuses that, and cannot name them."""
+    try:
+        for name in names:
+            look_up(name)
+    except InputError as error:
+        name_place(error, data.source)
+        name_parameter(error, "data")
+        raise

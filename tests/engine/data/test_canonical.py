@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
@@ -248,26 +248,26 @@ REFUSED: list[tuple[str, list[str]]] = [
 
 def test_refusals_name_the_place_what_came_what_is_allowed_and_the_cure(write: WriteFile) -> None:
     for content, parts in REFUSED:
-        with refused("data.csv", *parts, of=content):
+        with refusing("data.csv", *parts, of=content):
             read_csv(write(content))
     for name in ("configuration", "joint_1 [deg]", "target", "x [mm]", "y [mm]", "z [mm]"):
         header = ",".join(n for n in HEADER.replace("joint_2 [deg],", "").split(",") if n != name)
-        with refused("is missing", f"Add {name}"):
+        with refusing("is missing", f"Add {name}"):
             read_csv(write(f"{header}\n1,2,3,4,5\n"))
-    with refused("Save it as UTF-8"):
+    with refusing("Save it as UTF-8"):
         read_csv(write(PLAIN.encode("utf-16")))
-    with refused("Did you mean data.csv"):
+    with refusing("Did you mean data.csv"):
         read_csv(write(PLAIN).with_name("date.csv"))
 
 
 def test_writing_refuses_units_and_configurations_without_readings(write: WriteFile) -> None:
     data = read_csv(write(PLAIN))
-    with refused("length unit: ", "allowed: mm, m, um, in"):
+    with refusing("length unit: ", "allowed: mm, m, um, in"):
         csv_text(data, length_unit="cm")
-    with refused("angle unit: ", "allowed: deg, rad"):
+    with refusing("angle unit: ", "allowed: deg, rad"):
         csv_text(data, angle_unit="grad")
     unseen = Dataset(**(vars(data) | {"configuration": np.zeros(3, dtype=np.intp)}))
-    with refused("configuration P2: ", "without a reading", "missing readings"):
+    with refusing("configuration P2: ", "without a reading", "missing readings"):
         csv_text(unseen)
 
 
@@ -429,7 +429,7 @@ def test_a_circumstance_that_changes_within_a_configuration(write: WriteFile) ->
         cells = lines[2].split(",")
         before, cells[place] = cells[place], "7"
         said = f"data.csv, line 3, column {column}: {column} differs from line 2, which has the same configuration"
-        with refused(said, f"got '7'; allowed: {before}, as on line 2"):
+        with refusing(said, f"got '7'; allowed: {before}, as on line 2"):
             read_csv(write("\n".join([*lines[:2], ",".join(cells), *lines[3:]]) + "\n"))
 
 
@@ -485,5 +485,5 @@ def test_pose_files_that_are_none_are_refused(tmp_path: Path) -> None:
     ):
         file = tmp_path / "poses.csv"
         file.write_text(text)
-        with refused(words, of=text):
+        with refusing(words, of=text):
             read_poses(file)

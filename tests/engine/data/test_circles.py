@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.circles import Circle, fit_circle
@@ -107,5 +107,5 @@ def test_an_arc_too_short_is_refused_with_its_uncertainty_and_lines_and_handfuls
         (np.ones((5, 3)), "straight line"),
         (np.eye(3), "got 3"),
     ):
-        with refused(said):
+        with refusing(said):
             fit_circle(points)

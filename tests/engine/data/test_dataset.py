@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm import calibrate, check
 from truearm.engine.data.dataset import Dataset
@@ -130,10 +130,10 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
         wrong[parameter].append(np.ma.array(given[parameter], mask=given[parameter] == given[parameter].flat[0]))
     for parameter, values in wrong.items():
         for value in values:
-            with refused(parameter=parameter, of=f"{parameter} {value!r}"):
+            with refusing(parameter=parameter, of=f"{parameter} {value!r}"):
                 Dataset.of(**given | {parameter: value})
     for parameter, value in (("joints", 1e7 * np.ones((N, 6))), ("sigma", 2e3), ("order", 1e200 * np.arange(N))):
-        with refused("plausible", of=parameter):  # they ended in LinAlgError and OverflowError far from here
+        with refusing("plausible", of=parameter):  # they ended in LinAlgError and OverflowError far from here
             Dataset.of(**given | {parameter: value})
 
 
@@ -171,11 +171,11 @@ def test_names_that_no_file_can_hold_are_refused() -> None:
     q, p = joints(1), positions(1, 1)
     for name in ("", " ", "a\nb", "a\x00", "\ud800", "\u2028"):
         for parameter in ("targets", "configurations"):
-            with refused(parameter=parameter, of=ascii(name)):
+            with refusing(parameter=parameter, of=ascii(name)):
                 Dataset.of(q, p, **{parameter: [name]})  # type: ignore[arg-type]
         for field in ("targets", "labels", "fixtures"):
             if (field, name) != ("labels", ""):  # what is known of fixtures belongs to no configuration
-                with refused(parameter=field, of=ascii(name)):
+                with refusing(parameter=field, of=ascii(name)):
                     replace(Dataset.of(q, p), **{field: (name,)})  # type: ignore[arg-type]
     assert Dataset.of(q, p, targets=["Kugel\u00a01 \u00fc"]).targets == ("Kugel\u00a01 \u00fc",)
 
@@ -221,9 +221,9 @@ def test_a_dataset_checks_itself() -> None:
     for field, values in wrong.items():
         data = replace(sound(), references=None) if field in ("labels", "joints") else sound()
         for value in values:
-            with refused(parameter=field, of=f"{field} {value!r}"):
+            with refusing(parameter=field, of=f"{field} {value!r}"):
                 replace(data, **{field: value})
-    with refused(parameter="joints"):  # of which there are six
+    with refusing(parameter="joints"):  # of which there are six
         replace(sound(), joint_kinds=kinds, references=None)
 
 
@@ -233,7 +233,7 @@ def test_wrong_arrays_are_refused_before_a_job_starts() -> None:
     jobs: tuple[Callable[[Dataset], object], ...] = (lambda d: calibrate("irb120", d), check)
     for field, value in (("joints", data.joints * NAN), ("sigma", np.zeros(80)), ("position", np.zeros((80, 2)))):
         for job in jobs:
-            with refused(parameter=field):
+            with refusing(parameter=field):
                 job(replace(data, **{field: value}))  # type: ignore[arg-type]
 
 
@@ -328,9 +328,9 @@ def test_a_bootstrap_is_not_told_to_remove_its_copies() -> None:
 
 
 def test_a_check_of_nothing_is_refused() -> None:
-    with refused(parameter="data"):
+    with refusing(parameter="data"):
         check(sound().of_configurations([]))
-    with refused(parameter="data"):
+    with refusing(parameter="data"):
         check(load_robot("irb120"), Dataset.of(joints(), positions() * NAN))
 
 
@@ -360,9 +360,9 @@ def test_what_chooses_nothing_that_is_there_is_refused() -> None:
     ]
     for chosen in wrong:
         for part in (sound().of_configurations, sound().of_readings):
-            with refused(parameter="chosen", of=repr(chosen)):
+            with refusing(parameter="chosen", of=repr(chosen)):
                 part(chosen)
-    with refused(parameter="chosen"):
+    with refusing(parameter="chosen"):
         sound().of_configurations([N])
 
 

@@ -10,7 +10,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
@@ -134,11 +134,11 @@ def test_a_fixture_called_fixture_is_not_called_so_twice_and_may_share_a_targets
 
 def test_an_unknown_fixture_and_two_of_one_name_are_refused() -> None:
     for name in ("tabel", "wall"):
-        with refused(f"no fixture of this name; got '{name}'; allowed: table"):
+        with refusing(f"no fixture of this name; got '{name}'; allowed: table"):
             beside("plane").fixture_kinematics(name)
-    with refused("none: the robot has no fixtures"):
+    with refusing("none: the robot has no fixtures"):
         IRB120.fixture("wall")
-    with refused("fixture_7_x: two parameters ", "same name", "Rename the target or fixture"):
+    with refusing("fixture_7_x: two parameters ", "same name", "Rename the target or fixture"):
         IRB120.with_fixtures({"7": ("point", PLACE), "fixture_7": ("point", PLACE)})
 
 
@@ -190,10 +190,10 @@ def test_a_robot_file_refuses_what_is_no_fixture(tmp_path: Path) -> None:
         content.pop("parameters")
         with path.open("w", encoding="utf-8") as stream:
             YAML(typ="safe").dump(content, stream)
-        with refused("robot.yaml, fixtures", *said, of=changed):
+        with refusing("robot.yaml, fixtures", *said, of=changed):
             read_robot(path)
     text = robot_text(beside("point", Transform()))
     line = next(line for line in text.splitlines() if "kind: point" in line)
     path.write_text(text.replace(line, f"{line}\n{line}"), encoding="utf-8")
-    with refused("two parameters of the robot would have the same name"):
+    with refusing("two parameters of the robot would have the same name"):
         read_robot(path)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS, compared
@@ -233,7 +233,7 @@ def test_readings_declare_their_own_deviations_and_the_setup_its_own() -> None:
 def test_an_unknown_fixture_is_refused() -> None:
     robot = robot_with("rigid")
     problem = problem_of(robot.with_fixtures({}), readings_of(robot, [("distance", "point")]))
-    with refused("no fixture of this name; got 'point'"):
+    with refusing("no fixture of this name; got 'point'"):
         problem.residual(problem.free.start)
 
 

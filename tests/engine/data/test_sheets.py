@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.data.readers.cells import column_letters
-from truearm.engine.data.readers.table import read_table
+from truearm.engine.data.readers.table import read_noting
 
 openpyxl = pytest.importorskip("openpyxl")
 NO_WORKBOOK = "cell.xlsx: this is no Excel workbook that can be read"
@@ -55,7 +55,7 @@ def written(folder: Path, change: Callable[[Any], None] = lambda sheet: None, ma
 
 
 def read(folder: Path, change: Callable[[Any], None] = lambda sheet: None, mapping: str = MAP) -> Dataset:
-    return read_table(*written(folder, change, mapping))
+    return read_noting(*written(folder, change, mapping))[0]
 
 
 def put(place: str, value: object) -> Callable[[Any], None]:
@@ -111,7 +111,7 @@ def test_refusals_name_the_cell(tmp_path: Path) -> None:
         (put("AAA99999", 1), "'Cell 4'!AAA99999: this cell has no name in the header; got '1'"),
     ]
     for change, part in wrong:
-        with refused(part, of=part):
+        with refusing(part, of=part):
             read(tmp_path, change)
     assert read(tmp_path, lambda sheet: sheet.insert_rows(3)).labels == ("P2", "P1")  # an empty row changes nothing
     for layout, part in (
@@ -120,7 +120,7 @@ def test_refusals_name_the_cell(tmp_path: Path) -> None:
         ("{sheet: Cell 4, decimal: comma}", "map.yaml, layout.decimal: a workbook has cells, and no such thing"),
         ("{sheet: Notes}", "sheet Notes, line 1: the line that should hold the header is empty"),
     ):
-        with refused(part, of=layout):
+        with refusing(part, of=layout):
             read(tmp_path, mapping=MAP.replace("{sheet: Cell 4, header: 2}", layout))
 
 
@@ -132,7 +132,7 @@ def test_titles_may_be_merged_and_two_headings_are_refused(tmp_path: Path) -> No
         for place, text in zip(("A3", "B3", "C3", "D3", "E3", "F3"), ("", "deg", "deg", "mm", "mm", "mm"), strict=True):
             sheet[place] = text
 
-    with refused("'Cell 4'!D3: this row holds no numbers, like a second line of headings"):
+    with refusing("'Cell 4'!D3: this row holds no numbers, like a second line of headings"):
         read(tmp_path, units)
     assert read(tmp_path, units, MAP.replace("header: 2", "header: 2, first_row: 4")).configurations == 2
 
@@ -140,23 +140,23 @@ def test_titles_may_be_merged_and_two_headings_are_refused(tmp_path: Path) -> No
 def test_what_is_no_workbook(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     table, mapping = written(tmp_path)
     for ending in (".xls", ".ods"):
-        with refused("workbooks of this kind are not read", "Save it as an Excel workbook"):
-            read_table(table.with_suffix(ending), mapping)
+        with refusing("workbooks of this kind are not read", "Save it as an Excel workbook"):
+            read_noting(table.with_suffix(ending), mapping)
     (tmp_path / "text.csv").write_text("a,b\n")
-    with refused("only workbooks have sheets"):
-        read_table(tmp_path / "text.csv", mapping)
+    with refusing("only workbooks have sheets"):
+        read_noting(tmp_path / "text.csv", mapping)
     whole = table.read_bytes()
     for damaged in (b"a,b\n1,2\n", whole[:2000], whole[:600] + bytes(200) + whole[800:]):
         table.write_bytes(damaged)
-        with refused(NO_WORKBOOK):
-            read_table(table, mapping)
+        with refusing(NO_WORKBOOK):
+            read_noting(table, mapping)
     with zipfile.ZipFile(table, "w", zipfile.ZIP_DEFLATED) as parts:
         parts.writestr("xl/workbook.xml", " " * 20_000_001)
-    with refused("the workbook is too large; got '20000001 bytes unpacked'"):
-        read_table(table, mapping)
+    with refusing("the workbook is too large; got '20000001 bytes unpacked'"):
+        read_noting(table, mapping)
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     with pytest.raises(InputError, match=r"openpyxl, and it is not installed.*pip install .truearm\[excel\]"):
-        read_table(table, mapping)
+        read_noting(table, mapping)
 
 
 def test_columns_have_letters_and_numbers_are_those_that_excel_holds(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_sheets_that_no_spreadsheet_writes(tmp_path: Path) -> None:
         table, mapping = written(tmp_path)
         changed(table, old, new)
         if not part:
-            assert read_table(table, mapping).configurations == 2, new
+            assert read_noting(table, mapping)[0].configurations == 2, new
             continue
-        with refused(part, of=new):
-            read_table(table, mapping)
+        with refusing(part, of=new):
+            read_noting(table, mapping)

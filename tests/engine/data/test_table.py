@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.files import read_text
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text, read_csv
-from truearm.engine.data.readers.table import read_table
+from truearm.engine.data.readers.table import read_noting
 from truearm.importing.files import read_matrices
 
 LONG = "pose,q1,q2,ball,X,Y,Z\na,10,20,one,1,2,3\na,10,20,two,4,5,6\nb,30,40,one,7,,9\n"
@@ -52,7 +52,7 @@ def read(folder: Path, table: str, mapping: str, joints: str | None = None) -> D
     (folder / "map.yaml").write_text(mapping, encoding="utf-8")
     if joints is not None:
         (folder / "joints.csv").write_text(joints, encoding="utf-8", newline="")
-    return read_table(folder / "table.txt", folder / "map.yaml")
+    return read_noting(folder / "table.txt", folder / "map.yaml")[0]
 
 
 # -- meaning ---------------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def test_decimal_commas_title_lines_units_line_comments_and_encoding(tmp_path: P
         + "layout: {delimiter: semicolon, decimal: comma, header: 3, first_row: 5, comment: '%', encoding: cp1252}\n",
         encoding="utf-8",
     )
-    data = read_table(tmp_path / "table.txt", tmp_path / "map.yaml")
+    data = read_noting(tmp_path / "table.txt", tmp_path / "map.yaml")[0]
     assert data.targets == ("ä",)
     assert data.position.tolist() == [[-0.0125, 0.002, 0.003]]
 
@@ -123,11 +123,11 @@ def test_zero_bytes_all_over_are_said_to_be_of_another_encoding(tmp_path: Path) 
     for encoding in ("utf-16-le", "utf-16-be"):
         table.write_bytes(LONG.encode(encoding))
         mapping.write_text(MAP, encoding="utf-8")
-        with refused("zero bytes are those of UTF-16", "layout.encoding", f": {encoding}"):
-            read_table(table, mapping)
+        with refusing("zero bytes are those of UTF-16", "layout.encoding", f": {encoding}"):
+            read_noting(table, mapping)
         mapping.write_text(f"{MAP}layout: {{encoding: {encoding}}}\n", encoding="utf-8")
-        assert read_table(table, mapping).labels == ("a", "b")
-        with refused("UTF-16", "Save it as UTF-8"):
+        assert read_noting(table, mapping)[0].labels == ("a", "b")
+        with refusing("UTF-16", "Save it as UTF-8"):
             read_text(table)
 
 
@@ -195,9 +195,9 @@ def test_the_guides_examples_all_say_the_same(guide: Path) -> None:
     plain, missing = read_matrices(
         guide / "joints.txt", {n: guide / f"{n}.txt" for n in ("smr_1", "smr_2")}, {}, "deg", "mm"
     )
-    spatial = read_table(guide / "points.txt", guide / "spatial.yaml")
-    wide = read_table(guide / "wide.csv", guide / "wide.yaml")
-    blanks = read_table(guide / "blanks.txt", guide / "blanks.yaml")
+    spatial = read_noting(guide / "points.txt", guide / "spatial.yaml")[0]
+    wide = read_noting(guide / "wide.csv", guide / "wide.yaml")[0]
+    blanks = read_noting(guide / "blanks.txt", guide / "blanks.yaml")[0]
     assert missing == {"smr_1": 0, "smr_2": 1}
     assert spatial.references is not None
     assert spatial.references.targets == ("floor_1",)
@@ -286,12 +286,12 @@ REFUSED: list[tuple[str, str, list[str]]] = [
 
 def test_refusals(tmp_path: Path) -> None:
     for table, mapping, parts in REFUSED:
-        with refused(*parts, of=parts):
+        with refusing(*parts, of=parts):
             read(tmp_path, table, mapping, JOINTS)
     (tmp_path / "map.yaml").write_text(MAP)
     (tmp_path / "table.txt").write_bytes(LONG.replace("two", "tw@").encode().replace(b"@", b"\xe4"))
-    with refused("line 3, cell 4: the file is not utf-8 text"):
-        read_table(tmp_path / "table.txt", tmp_path / "map.yaml")
+    with refusing("line 3, cell 4: the file is not utf-8 text"):
+        read_noting(tmp_path / "table.txt", tmp_path / "map.yaml")
 
 
 def test_one_name_may_stand_in_two_files(tmp_path: Path) -> None:

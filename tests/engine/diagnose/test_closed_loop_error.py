@@ -51,23 +51,23 @@ def true_error(fit: Fit, twin: Twin) -> float:
     """Return the mean error all over the limits [m], behind the best rigid motion where nothing locates the robot."""
     q = IRB120.random_configurations(200, np.random.default_rng(99))
     frames = twin.frames(q)
-    found = np.concatenate([fit.robot.world_poses(q, t.name)[0] for t in fit.robot.targets])
+    values = np.concatenate([fit.robot.world_poses(q, t.name)[0] for t in fit.robot.targets])
     true = np.concatenate([frames[t.name][:, :3, 3] for t in fit.robot.targets])
     if fit.gauge_freedoms:
-        R, t = rigid_motion(found, true)
-        found = found @ R.T + t
-    return float(np.linalg.norm(found - true, axis=1).mean())
+        R, t = rigid_motion(values, true)
+        values = values @ R.T + t
+    return float(np.linalg.norm(values - true, axis=1).mean())
 
 
 def stated_and_true(device: str, truth: str) -> Array:
     """Return the stated mean, the ends of its interval and the true error of twelve robots, ``(4, robots)`` [m]."""
-    found = []
+    pairs = []
     for seed in range(12):
         twin, data = measured(device, truth, 60, seed)
         fit = identify(IRB120, data, GEOMETRIC)
         stated = expected_error(fit).overall
-        found.append([stated.mean, *stated.interval_90, true_error(fit, twin)])
-    return np.array(found).T
+        pairs.append([stated.mean, *stated.interval_90, true_error(fit, twin)])
+    return np.array(pairs).T
 
 
 @pytest.mark.parametrize("device", ["point", "plane", "two-sockets", "ballbar", "strings", "tracker"])
@@ -102,7 +102,7 @@ def test_priors_hold_the_size_that_nothing_tells() -> None:
 
 
 def test_the_note_says_what_the_error_is_with_the_scale_and_without() -> None:
-    for device, told in (("point", True), ("two-sockets", False)):
+    for device, has_note in (("point", True), ("two-sockets", False)):
         _, data = measured(device, "random", 60, 1)
         fit = identify(IRB120, data, GEOMETRIC)
         expected = expected_error(fit)
@@ -110,9 +110,9 @@ def test_the_note_says_what_the_error_is_with_the_scale_and_without() -> None:
         assert (
             f"accurate to about {expected.overall.mean * 1e3:.2g} mm on average, up to the unknown base pose." in note
         )
-        assert ("No length was measured either" in note) is told
+        assert ("No length was measured either" in note) is has_note
         assert expected.frame == "the robot's base frame, up to its pose"
-        if told:
+        if has_note:
             assert f"would be {expected.without_scale.mean * 1e3:.2g} mm" in note
             assert expected.without_scale.mean < 0.2 * expected.overall.mean
         else:

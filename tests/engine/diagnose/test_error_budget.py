@@ -14,7 +14,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import table_motion, without_table_motion
 from truearm.engine.diagnose.error_budget import ErrorBudget, Source, error_budget
 from truearm.engine.diagnose.expected_error import expected_error
-from truearm.engine.document.document import held_by, lines_of
+from truearm.engine.document.document import json_of, lines_of
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import MODELS
 from truearm.engine.robot.chain import Array
@@ -52,9 +52,9 @@ def judged(
     data = read(twin, joints, noise, rng, repeat)
     if data.sigma is not None:
         data = replace(data, sigma=None if declared is None else declared * data.sigma)
-    first, rest = (data.of_configurations(part) for part in np.split(np.arange(len(joints)), [poses * visits]))
+    first, remaining = (data.of_configurations(part) for part in np.split(np.arange(len(joints)), [poses * visits]))
     fit = identify(ROBOT, first, MODEL["geometric"])
-    return known(error_budget(fit, data, first, rest)), fit, twin, rest
+    return known(error_budget(fit, data, first, remaining)), fit, twin, remaining
 
 
 def square(budget: ErrorBudget, source: Source) -> float:
@@ -64,15 +64,15 @@ def square(budget: ErrorBudget, source: Source) -> float:
 def of_the_model(fit: Fit, twin: Twin, data: Dataset) -> float:
     """Return the true mean square error of what the robot predicts."""
     true = measure(twin, data.joints, 0.0, np.random.default_rng(0)).position.reshape(len(data.joints), -1, 3)
-    found = np.stack([fit.robot.world_poses(data.joints, name)[0] for name in data.targets], axis=1)
-    return float(np.mean(np.sum((found - true) ** 2, axis=2)))
+    values = np.stack([fit.robot.world_poses(data.joints, name)[0] for name in data.targets], axis=1)
+    return float(np.mean(np.sum((values - true) ** 2, axis=2)))
 
 
 def test_the_shares_add_up_to_the_held_out_square() -> None:
     budget, *_ = judged("tracker-triangular", 40, 0.02e-3, 1)
     shares = [share.square for share in budget.shares if share.square is not None]
     assert sum(shares) == pytest.approx(budget.square, rel=1e-12)
-    summary = held_by([budget_block(budget)])["limits_of_accuracy"]
+    summary = json_of([budget_block(budget)])["limits_of_accuracy"]
     assert sum(s["square_mm2"] or 0.0 for s in summary["shares"]) == pytest.approx(summary["rms_mm"] ** 2, rel=1e-9)
     (line,) = lines_of([budget_block(budget)])
     parts = line.split("; ")[0].split(": ")[1].split(", ")
@@ -104,22 +104,22 @@ def test_noise_alone_is_the_instruments() -> None:
 
 
 def test_the_share_of_the_parameters_is_what_they_do_at_unseen_poses() -> None:
-    made = [judged("random", 14, 0.05e-3, seed) for seed in range(6)]
-    true = [of_the_model(fit, twin, rest) for _, fit, twin, rest in made]
-    shares = [square(budget, "parameters") for budget, *_ in made]
-    doubt = np.linalg.norm([budget.share("parameters").deviation for budget, *_ in made]) / len(made)
+    result = [judged("random", 14, 0.05e-3, seed) for seed in range(6)]
+    true = [of_the_model(fit, twin, others) for _, fit, twin, others in result]
+    shares = [square(budget, "parameters") for budget, *_ in result]
+    doubt = np.linalg.norm([budget.share("parameters").deviation for budget, *_ in result]) / len(result)
     assert abs(np.mean(shares) - np.mean(true)) < 2.5 * doubt < 0.7 * np.mean(true)
-    for (budget, *_), is_so in zip(made, true, strict=True):
+    for (budget, *_), is_so in zip(result, true, strict=True):
         assert abs(square(budget, "parameters") - is_so) < 3 * budget.share("parameters").deviation
 
 
 def test_what_the_model_lacks_is_found() -> None:
-    made = [judged("tracker-triangular", 80, 0.02e-3, n % 3, declared=1.0 if n < 3 else None) for n in range(6)]
-    for budget, fit, twin, rest in made:
-        true = of_the_model(fit, twin, rest)
-        found = square(budget, "model") + square(budget, "parameters")
+    result = [judged("tracker-triangular", 80, 0.02e-3, n % 3, declared=1.0 if n < 3 else None) for n in range(6)]
+    for budget, fit, twin, others in result:
+        true = of_the_model(fit, twin, others)
+        explained = square(budget, "model") + square(budget, "parameters")
         doubt = np.hypot(budget.share("model").deviation, budget.share("parameters").deviation)
-        assert abs(found - true) < 3 * np.hypot(doubt, budget.deviation)
+        assert abs(explained - true) < 3 * np.hypot(doubt, budget.deviation)
         assert square(budget, "model") > 0.6 * true
         assert "how well the robot comes back" in budget.share("model").words
         assert square(budget, "instrument") == pytest.approx(3 * 0.02e-3**2, rel=0.3)
@@ -127,12 +127,12 @@ def test_what_the_model_lacks_is_found() -> None:
 
 def test_repeatability_is_told_from_the_model_where_postures_were_visited_again() -> None:
     repeat = np.radians(0.01)
-    budget, _, twin, rest = judged("random", 30, 0.02e-3, 1, repeat=repeat, visits=3)
-    at = measure(twin, rest.joints, 0.0, np.random.default_rng(0)).position
+    budget, _, twin, remaining = judged("random", 30, 0.02e-3, 1, repeat=repeat, visits=3)
+    at = measure(twin, remaining.joints, 0.0, np.random.default_rng(0)).position
     moved = 0.0
     for joint in range(6):
-        there = measure(twin, rest.joints + 1e-6 * np.eye(6)[joint], 0.0, np.random.default_rng(0)).position
-        moved += float(np.mean(np.sum(((there - at) / 1e-6) ** 2, axis=1)))
+        repeated = measure(twin, remaining.joints + 1e-6 * np.eye(6)[joint], 0.0, np.random.default_rng(0)).position
+        moved += float(np.mean(np.sum(((repeated - at) / 1e-6) ** 2, axis=1)))
     share = budget.share("repeatability")
     assert share.square == pytest.approx(moved * repeat**2, abs=3 * share.deviation)
     assert share.deviation < 0.2 * moved * repeat**2
@@ -151,10 +151,10 @@ def test_declared_deviations_that_are_too_large_show_as_a_negative_share() -> No
 def test_an_effect_outside_the_training_part_is_a_remainder_that_is_not_explained() -> None:
     rng = np.random.default_rng(3)
     twin, data = campaign("irb120", 60, 0.02e-3, 3)
-    rest = read(twin, ROBOT.random_configurations(40, rng), 0.02e-3, rng)
-    rest = replace(rest, position=rest.position + np.array([0.5e-3, 0.0, 0.0]))
+    remaining = read(twin, ROBOT.random_configurations(40, rng), 0.02e-3, rng)
+    remaining = replace(remaining, position=remaining.position + np.array([0.5e-3, 0.0, 0.0]))
     fit = identify(ROBOT, data, MODEL["geometric"])
-    budget = known(error_budget(fit, data, data, rest))
+    budget = known(error_budget(fit, data, data, remaining))
     assert not budget.remainder_is_chance
     assert square(budget, "remainder") == pytest.approx(0.5e-3**2, rel=0.1)
     assert budget.share("remainder").words.startswith("not explained: the robot errs more")
@@ -177,8 +177,11 @@ def test_nothing_held_out_leaves_no_remainder() -> None:
 def test_lengths_and_positions_before_a_fixture_have_a_budget_too(device: str, count: int, kind: str) -> None:
     rng = np.random.default_rng(5)
     data = measured_with(named_device(device), ROBOT, truth_twin(ROBOT, "random", rng), count, rng)
-    first, rest = data.of_configurations(range(3 * count // 4)), data.of_configurations(range(3 * count // 4, count))
-    budget = known(error_budget(identify(ROBOT, first, MODEL["geometric"]), data, first, rest))
+    first, remaining = (
+        data.of_configurations(range(3 * count // 4)),
+        data.of_configurations(range(3 * count // 4, count)),
+    )
+    budget = known(error_budget(identify(ROBOT, first, MODEL["geometric"]), data, first, remaining))
     assert (budget.kind, budget.remainder_is_chance) == (kind, True)
     sigma = known(data.sigma)[0]
     assert square(budget, "instrument") == pytest.approx(sigma**2 * (1 if kind == "length" else 3))
@@ -194,8 +197,8 @@ def on_a_moving_table(noise: float) -> tuple[Dataset, Array]:
     turns = rotation_from_vector(1e-4 * rng.standard_normal((80, 3)))
     shifts = 0.2e-3 * rng.standard_normal((80, 3))
     seen = points @ np.swapaxes(turns, 1, 2) + shifts[:, None] + noise * rng.standard_normal((80, 4, 3))
-    mine = data.configuration
-    position = np.einsum("nij,nj->ni", turns[mine], data.position) + shifts[mine]
+    rows = data.configuration
+    position = np.einsum("nij,nj->ni", turns[rows], data.position) + shifts[rows]
     beside = replace(
         data,
         targets=("a", "b", "c", "d"),
@@ -217,8 +220,8 @@ def test_what_is_left_of_the_tables_motion_has_a_share() -> None:
     assert motion.removed == pytest.approx(removed, rel=1e-6)
     assert table_motion(replace(still, references=None)) is None
     still = without_table_motion(replace(moving, sigma=np.full(len(moving.target), 1e-6)))
-    first, rest = still.of_configurations(range(50)), still.of_configurations(range(50, 80))
-    budget = known(error_budget(identify(ROBOT, first, MODEL["geometric"]), still, first, rest))
+    first, remaining = still.of_configurations(range(50)), still.of_configurations(range(50, 80))
+    budget = known(error_budget(identify(ROBOT, first, MODEL["geometric"]), still, first, remaining))
     share = budget.share("table")
     assert known(share.square) > 10 * abs(square(budget, "instrument"))
     assert "after a motion of 0.51 mm" in share.words

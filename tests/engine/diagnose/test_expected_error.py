@@ -67,34 +67,34 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Fit:
 
 
 def test_closed_forms_of_one_joint(arm: Fit, tmp_path: Path) -> None:
-    found = expected_error(uncertain(arm, theta_offset_1=1e-4)).overall  # it moves its target by the arm
-    assert found.mean == pytest.approx(0.5e-4 * np.sqrt(2 / np.pi), rel=0.1)
-    assert found.interval_90[0] == pytest.approx(0.5e-4 * 0.0627, rel=0.4)
-    assert found.interval_90[1] == pytest.approx(0.5e-4 * 1.960, rel=0.15)
-    assert found.p95 == pytest.approx(found.mean, rel=1e-3)
-    found = expected_error(uncertain(arm, base_x=1e-4, base_y=1e-4, base_z=1e-4)).overall  # known alike in all
-    assert found.mean == pytest.approx(1e-4 * np.sqrt(8 / np.pi), rel=0.1)
-    np.testing.assert_allclose(found.interval_90, [0.593e-4, 2.795e-4], rtol=0.2)
-    found = expected_error(uncertain(fitted(SLIDE, tmp_path), d_1=1e-4)).overall
-    assert found.mean == pytest.approx(1e-4 * np.sqrt(2 / np.pi), rel=0.1)
-    found = expected_error(uncertain(arm, theta_offset_1=1.0)).overall  # large angles go round
+    result = expected_error(uncertain(arm, theta_offset_1=1e-4)).overall  # it moves its target by the arm
+    assert result.mean == pytest.approx(0.5e-4 * np.sqrt(2 / np.pi), rel=0.1)
+    assert result.interval_90[0] == pytest.approx(0.5e-4 * 0.0627, rel=0.4)
+    assert result.interval_90[1] == pytest.approx(0.5e-4 * 1.960, rel=0.15)
+    assert result.p95 == pytest.approx(result.mean, rel=1e-3)
+    result = expected_error(uncertain(arm, base_x=1e-4, base_y=1e-4, base_z=1e-4)).overall  # known alike in all
+    assert result.mean == pytest.approx(1e-4 * np.sqrt(8 / np.pi), rel=0.1)
+    np.testing.assert_allclose(result.interval_90, [0.593e-4, 2.795e-4], rtol=0.2)
+    result = expected_error(uncertain(fitted(SLIDE, tmp_path), d_1=1e-4)).overall
+    assert result.mean == pytest.approx(1e-4 * np.sqrt(2 / np.pi), rel=0.1)
+    result = expected_error(uncertain(arm, theta_offset_1=1.0)).overall  # large angles go round
     angles = np.random.default_rng(1).standard_normal(100_000)
-    assert found.mean == pytest.approx(float(np.mean(np.abs(np.sin(angles / 2)))), rel=0.1)
-    assert found.interval_90[1] <= 1.0
+    assert result.mean == pytest.approx(float(np.mean(np.abs(np.sin(angles / 2)))), rel=0.1)
+    assert result.interval_90[1] <= 1.0
     loop = replace(uncertain(arm, theta_offset_1=1e-4), gauge_freedoms=("base",))
     assert expected_error(loop).overall.mean < 1e-12  # a motion of everything does not count in a closed loop
 
 
 def test_an_error_of_every_visit_is_in_the_error_to_expect_and_makes_it_a_lower_bound(arm: Fit) -> None:
     fit = replace(arm, joint_error=np.array([1e-4]), weight=np.ones(10**6))
-    found = expected_error(fit)
-    assert found.remainder == pytest.approx(0.5e-4, rel=1e-3)
-    assert found.overall.mean == pytest.approx(0.5e-4 * np.sqrt(2 / np.pi), rel=0.02)
-    assert found.overall.p95 == pytest.approx(0.5e-4 * 1.960, rel=0.05)
-    low, high = found.overall.interval_90
-    assert found.overall.mean * 0.85 < low < high < found.overall.mean * 1.15
-    assert found.lower_bound
-    assert "the model cannot express" in found.omissions[0]
+    result = expected_error(fit)
+    assert result.by_joint_error == pytest.approx(0.5e-4, rel=1e-3)
+    assert result.overall.mean == pytest.approx(0.5e-4 * np.sqrt(2 / np.pi), rel=0.02)
+    assert result.overall.p95 == pytest.approx(0.5e-4 * 1.960, rel=0.05)
+    low, high = result.overall.interval_90
+    assert result.overall.mean * 0.85 < low < high < result.overall.mean * 1.15
+    assert result.lower_bound
+    assert "the model cannot express" in result.omissions[0]
 
 
 def test_joint_errors_count_as_far_as_the_residuals_allow() -> None:
@@ -151,10 +151,10 @@ def test_what_makes_it_a_lower_bound(arm: Fit) -> None:
     bare = calibrate(IRB120, campaign("irb120", 30, 0.02e-3, 1, "nominal")[1], model="frames").expected
     assert (bare.lower_bound, bare.omissions[0]) == (True, "the robot's own geometry counts as exact")
     _, data = campaign("irb120", 30, 0.02e-3, 1)
-    found = calibrate(IRB120, replace(data, position=data.position * 1e3))
-    assert found.status is Status.IMPLAUSIBLE
-    assert "what was fitted cannot be this robot" in found.expected.omissions
-    assert "narrow-data" not in {n.code for n in found.warnings}
+    result = calibrate(IRB120, replace(data, position=data.position * 1e3))
+    assert result.status is Status.IMPLAUSIBLE
+    assert "what was fitted cannot be this robot" in result.expected.omissions
+    assert "narrow-data" not in {n.code for n in result.warnings}
 
 
 def test_what_is_left_is_not_said_to_be_the_robots_where_readings_are_doubted() -> None:
@@ -197,9 +197,9 @@ def test_true_errors_are_as_expected() -> None:
         for seed in range(10):
             twin, data = read_narrowly(degrees, seed)
             fit = identify(IRB120, data, MODEL["geometric"])
-            found, true = expected_error(fit).overall, true_error(fit, twin)
-            ratios.append(true / found.mean)
-            inside.append(found.interval_90[0] <= true <= found.interval_90[1])
+            result, true = expected_error(fit).overall, true_error(fit, twin)
+            ratios.append(true / result.mean)
+            inside.append(result.interval_90[0] <= true <= result.interval_90[1])
         assert 0.7 < np.median(ratios) < 1.4, degrees
         assert np.mean(inside) >= 0.7, degrees
     ratios = []  # parameters that were held are uncertain too
@@ -212,11 +212,11 @@ def test_true_errors_are_as_expected() -> None:
 
 def test_each_target_has_its_own_figures_and_all_are_in_the_overall_one() -> None:
     _, data = read_narrowly(40.0, 0)
-    found = expected_error(identify(IRB120, data, MODEL["geometric"]))
-    assert list(found.targets) == ["1", "2", "3"]
-    assert np.mean([target.mean for target in found.targets.values()]) == pytest.approx(found.overall.mean)
-    assert found.frame == "the instrument's frame"
-    assert found.overall.interval_90[0] < found.overall.mean < min(found.overall.interval_90[1], found.overall.p95)
+    result = expected_error(identify(IRB120, data, MODEL["geometric"]))
+    assert list(result.targets) == ["1", "2", "3"]
+    assert np.mean([target.mean for target in result.targets.values()]) == pytest.approx(result.overall.mean)
+    assert result.frame == "the instrument's frame"
+    assert result.overall.interval_90[0] < result.overall.mean < min(result.overall.interval_90[1], result.overall.p95)
 
 
 def test_a_map_is_dark_where_nothing_was_measured() -> None:
@@ -236,11 +236,11 @@ def calibrated(degrees: float | None, train: str | None = None) -> Calibration:
 
 
 def test_narrow_data_are_an_error_that_names_the_joints() -> None:
-    found = calibrated(5.0)
-    (notice,) = (n for n in found.warnings if n.code == "narrow-data")
+    result = calibrated(5.0)
+    (notice,) = (n for n in result.warnings if n.code == "narrow-data")
     assert notice.level == "error"
-    assert not found.finished
-    assert found.status is Status.CONVERGED
+    assert not result.finished
+    assert result.status is Status.CONVERGED
     assert "where the held-out error is 0.03" in notice.message
     for joint in IRB120.joints:
         assert f"{joint.name} (measured " in notice.message
@@ -250,12 +250,12 @@ def test_narrow_data_are_an_error_that_names_the_joints() -> None:
     # less narrow data are a warning
     rng = np.random.default_rng(3)
     twin = truth_twin(IRB120, "random", rng)
-    one = replace(twin, robot=twin.robot.with_frames(twin.robot.base, {"1": (0.0, 0.0, 0.125)}))
-    data = measure(one, narrowed(40.0).random_configurations(60, rng), 0.02e-3, rng)
-    found = calibrate(IRB120, data)
-    (notice,) = (n for n in found.warnings if n.code == "narrow-data")
+    narrow = replace(twin, robot=twin.robot.with_frames(twin.robot.base, {"1": (0.0, 0.0, 0.125)}))
+    data = measure(narrow, narrowed(40.0).random_configurations(60, rng), 0.02e-3, rng)
+    result = calibrate(IRB120, data)
+    (notice,) = (n for n in result.warnings if n.code == "narrow-data")
     assert notice.level == "warning"
-    assert found.finished
+    assert result.finished
 
 
 def test_data_of_one_orientation_name_a_region() -> None:
@@ -268,25 +268,25 @@ def test_data_of_one_orientation_name_a_region() -> None:
     alike = IRB120.inverse(places[near], np.repeat(turned[:1], len(near), axis=0), seed=q[near]).joints
     alike = alike[np.isfinite(alike).all(axis=1)][:60]
     assert (np.ptp(alike, axis=0) > 0.5 * np.minimum(2 * np.pi, [np.ptp(j.range) for j in IRB120.joints])).all()
-    found = calibrate(IRB120, measure(twin, alike, 0.02e-3, rng))
-    (notice,) = (n for n in found.warnings if n.code == "narrow-data")
+    result = calibrate(IRB120, measure(twin, alike, 0.02e-3, rng))
+    (notice,) = (n for n in result.warnings if n.code == "narrow-data")
     assert "also with targets about" in notice.message
 
 
 def test_data_of_the_whole_workspace_and_without_noise_are_not_called_narrow() -> None:
     for seed in range(2):
-        found = calibrate(IRB120, campaign("irb120", 60, 0.02e-3, seed)[1])
-        assert "narrow-data" not in {n.code for n in found.warnings}
-        assert found.expected.overall.mean < known(known(found.validation).position).mean
-    found = calibrate(IRB120, campaign("irb120", 40, 0.0, 1)[1])
-    assert "narrow-data" not in {n.code for n in found.warnings}
+        result = calibrate(IRB120, campaign("irb120", 60, 0.02e-3, seed)[1])
+        assert "narrow-data" not in {n.code for n in result.warnings}
+        assert result.expected.overall.mean < known(known(result.validation).position).mean
+    result = calibrate(IRB120, campaign("irb120", 40, 0.0, 1)[1])
+    assert "narrow-data" not in {n.code for n in result.warnings}
 
 
 def test_a_closed_loop_is_expected_up_to_its_gauge_freedoms() -> None:
     rng = np.random.default_rng(0)
     twin = truth_twin(IRB120, "random", rng)
-    found = calibrate(IRB120, measured_with(named_device("gauges"), IRB120, twin, 60, rng))
-    assert found.expected.frame.startswith("the robot's base frame, up to its pose")
-    (notice,) = (n for n in found.warnings if n.code == "closed-loop")
-    assert f"accurate to about {found.expected.overall.mean * 1e3:.2g} mm" in notice.message
-    assert "narrow-data" not in {n.code for n in found.warnings}
+    result = calibrate(IRB120, measured_with(named_device("gauges"), IRB120, twin, 60, rng))
+    assert result.expected.frame.startswith("the robot's base frame, up to its pose")
+    (notice,) = (n for n in result.warnings if n.code == "closed-loop")
+    assert f"accurate to about {result.expected.overall.mean * 1e3:.2g} mm" in notice.message
+    assert "narrow-data" not in {n.code for n in result.warnings}

@@ -20,7 +20,7 @@ from truearm.checking.check import check
 from truearm.engine.base.errors import Notice
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.changes import check_changes, find_change
+from truearm.engine.diagnose.changes import find_change, notices_of_change
 from truearm.engine.diagnose.gain import check_gain, signed_rank_probability
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
 from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
@@ -86,9 +86,9 @@ def test_pairs_tell_gain_loss_and_neither() -> None:
 def test_a_robot_that_is_accurate_already_is_no_error() -> None:
     for seed in (5, 3):
         accurate = campaign("irb120", 40, 2e-5, seed, "nominal")[1]
-        found = truearm.calibrate("irb120", accurate)
-        assert [(n.code, n.level) for n in found.warnings] == [("no-gain", "warning")], seed
-        assert (found.finished, found.faults) == (True, ("no-gain",)), seed
+        result = truearm.calibrate("irb120", accurate)
+        assert [(n.code, n.level) for n in result.warnings] == [("no-gain", "warning")], seed
+        assert (result.finished, result.faults) == (True, ("no-gain",)), seed
         assert truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, seed)[1]).faults == (), seed
     # without a held-out part or another robot nothing is compared
     codes = {notice.code for notice in truearm.calibrate("irb120", accurate, train="all").warnings}
@@ -184,19 +184,19 @@ def fitted(data: Dataset, loss: Loss = "linear") -> Fit:
 def test_a_fit_that_leaves_nothing_is_not_taken_for_one_without_noise(seed: int) -> None:
     """33 numbers for 41 parameters: the expected error was a ten thousandth of the true one, and the advice to stop."""
     twin = campaign("ur5e", 16, FINE, seed)[0]
-    found = calibrate("ur5e", in_turn(16, seed, declared=False), seed=seed)
+    result = calibrate("ur5e", in_turn(16, seed, declared=False), seed=seed)
     q = load_robot("ur5e").random_configurations(100, np.random.default_rng(1))
-    apart = [found.robot.world_poses(q, name)[0] - twin.robot.world_poses(q, name)[0] for name in ("1", "2", "3")]
+    apart = [result.robot.world_poses(q, name)[0] - twin.robot.world_poses(q, name)[0] for name in ("1", "2", "3")]
     true = float(np.linalg.norm(apart, axis=2).mean())
-    assert found.expected.overall.interval_90[1] > true
-    assert found.expected.overall.mean > 0.1e-3
-    (notice,) = [n for n in found.warnings if n.code == FEW_READINGS.code]
+    assert result.expected.overall.interval_90[1] > true
+    assert result.expected.overall.mean > 0.1e-3
+    (notice,) = [n for n in result.warnings if n.code == FEW_READINGS.code]
     assert notice.level == "warning"
     assert "The training readings are 33 numbers. The 41 parameters take up 3" in notice.message
     assert "no deviation is declared: it is assumed, 0.1 mm (position)" in notice.message
-    assert found.next[0].code == "measure-more"
-    assert "read more targets" in found.next[0].message
-    assert not {"stop", "unexplained"} & {step.code for step in found.next}
+    assert result.next[0].code == "measure-more"
+    assert "read more targets" in result.next[0].message
+    assert not {"stop", "unexplained"} & {step.code for step in result.next}
 
 
 def test_declared_deviations_are_never_made_smaller_by_what_is_left() -> None:
@@ -249,21 +249,21 @@ def test_readings_enough_are_no_notice() -> None:
 
 
 def test_a_check_counts_the_numbers_and_says_to_measure_more() -> None:
-    found = check("ur5e", in_turn(16, 0, declared=False))
-    (notice,) = found.warnings[-1:]
+    result = check("ur5e", in_turn(16, 0, declared=False))
+    (notice,) = result.warnings[-1:]
     assert notice.code == FEW_READINGS.code
     assert "48 numbers, for 41 parameters of the geometric model" in notice.message
-    codes = [step.code for step in found.next]
+    codes = [step.code for step in result.next]
     assert (codes[-1], "calibrate" in codes) == ("measure-more", False)
 
 
 def test_errors_that_the_fit_has_eaten_do_not_make_data_narrow() -> None:
     """With nothing held out the expected error of an honest campaign was many times what the fit had left."""
     whole = replace(campaign("irb120", 13, FINE, 3)[1], sigma=None)
-    one = replace(whole, position=np.where((whole.target == 0)[:, None], whole.position, np.nan))
+    masked = replace(whole, position=np.where((whole.target == 0)[:, None], whole.position, np.nan))
     for poses, few in ((11, True), (13, False)):
-        found = calibrate("irb120", one.of_configurations(np.arange(poses)), train="all")
-        codes = [notice.code for notice in found.warnings]
+        result = calibrate("irb120", masked.of_configurations(np.arange(poses)), train="all")
+        codes = [notice.code for notice in result.warnings]
         assert (FEW_READINGS.code in codes) is few
         assert "narrow-data" not in codes
 
@@ -280,8 +280,10 @@ def honest() -> tuple[Twin, Dataset]:
     return twin, replace(data, sigma=None, number=np.arange(50.0))
 
 
-def told(data: Dataset, robot: str = "irb120") -> list[Notice]:
-    return check_changes(LeftOver.of(identify(load_robot(robot), data, named_model("geometric")), data))
+def notices_of(data: Dataset, robot: str = "irb120") -> list[Notice]:
+    left = LeftOver.of(identify(load_robot(robot), data, named_model("geometric")), data)
+    change = find_change(left)
+    return [] if change is None else notices_of_change(left, change)
 
 
 def moved_instrument(data: Dataset, shift: Array, turn: Array | None = None) -> Dataset:
@@ -291,12 +293,12 @@ def moved_instrument(data: Dataset, shift: Array, turn: Array | None = None) -> 
 
 
 def test_a_moved_instrument_is_named_with_its_configuration_and_size() -> None:
-    (notice,) = told(moved_instrument(honest()[1], np.array([1.2e-3, -1.6e-3, 0.0])))
+    (notice,) = notices_of(moved_instrument(honest()[1], np.array([1.2e-3, -1.6e-3, 0.0])))
     assert (notice.code, notice.level) == ("instrument-moved", "error")
     size = re.match(f"From configuration {FIRST_MOVED + 1} on, all readings stand ([0-9.]+) mm", notice.message)
     assert float(known(size)[1]) == pytest.approx(2.0, rel=0.05)
     assert "`base_changes`" in notice.message
-    (notice,) = told(moved_instrument(honest()[1], np.array([0.0, 0.0, 0.16e-3])))
+    (notice,) = notices_of(moved_instrument(honest()[1], np.array([0.0, 0.0, 0.16e-3])))
     assert (notice.code, notice.level) == ("instrument-moved", "warning")
 
 
@@ -305,7 +307,7 @@ def test_a_moved_target_is_named() -> None:
     _, R = twin.robot.world_poses(data.joints)
     late = (data.configuration >= FIRST_MOVED) & (data.target == 1)
     shift = R[data.configuration] @ np.array([0.0, 1e-3, 0.0])
-    (notice,) = told(replace(data, position=np.where(late[:, None], data.position + shift, data.position)))
+    (notice,) = notices_of(replace(data, position=np.where(late[:, None], data.position + shift, data.position)))
     assert (notice.code, notice.level) == ("target-moved", "error")
     assert notice.message.startswith(f"From configuration {FIRST_MOVED + 1} on, target 2 stands 1")
     assert 0.9 < float(re.findall(r"stands ([0-9.]+) mm", notice.message)[0]) < 1.1
@@ -316,17 +318,17 @@ def test_a_jumped_joint_zero_is_named() -> None:
     for joint in (1, 3, 6):
         joints = data.joints.copy()
         joints[FIRST_MOVED:, joint - 1] += np.radians(0.2)
-        (notice,) = told(replace(data, joints=joints))
+        (notice,) = notices_of(replace(data, joints=joints))
         assert (notice.code, notice.level) == ("joint-zero-jumped", "error")
-        found = known(re.search(r"From configuration (\d+) on, joint (\d) stands ([0-9.]+) deg off", notice.message))
-        assert (int(found[1]), int(found[2])) == (FIRST_MOVED + 1, joint)
-        assert 0.18 < float(found[3]) < 0.22
+        match = known(re.search(r"From configuration (\d+) on, joint (\d) stands ([0-9.]+) deg off", notice.message))
+        assert (int(match[1]), int(match[2])) == (FIRST_MOVED + 1, joint)
+        assert 0.18 < float(match[3]) < 0.22
 
 
 def test_a_drift_is_told() -> None:
     _, data = honest()
     along = (data.configuration / data.configurations)[:, None] * np.array([0.5e-3, 0.0, 0.0])
-    (notice,) = told(replace(data, position=data.position + along))
+    (notice,) = notices_of(replace(data, position=data.position + along))
     assert (notice.code, notice.level) == ("drift", "warning")
     assert "Measure reference points" in notice.message
 
@@ -334,30 +336,30 @@ def test_a_drift_is_told() -> None:
 def test_nothing_is_told_of_honest_campaigns() -> None:
     for robot, seed in product(("irb120", "katana450", "kr5", "ur10"), range(3)):
         _, data = campaign(robot, 40, 0.05e-3, seed)
-        assert told(replace(data, number=np.arange(40.0)), robot) == [], (robot, seed)
+        assert notices_of(replace(data, number=np.arange(40.0)), robot) == [], (robot, seed)
 
 
 def test_rows_in_another_order_say_the_same() -> None:
     data = moved_instrument(honest()[1], np.array([2e-3, 0.0, 0.0]))
     shuffled = data.of_configurations(np.random.default_rng(0).permutation(50))
-    (notice,) = told(shuffled)
+    (notice,) = notices_of(shuffled)
     assert notice.message.startswith(f"From configuration {FIRST_MOVED + 1} on, all readings stand 1.9")
-    assert told(data.of_configurations(np.arange(FIRST_MOVED - 9, FIRST_MOVED + 9))) == []
+    assert notices_of(data.of_configurations(np.arange(FIRST_MOVED - 9, FIRST_MOVED + 9))) == []
 
 
 def test_without_an_order_that_of_the_file_is_tried_unless_it_follows_a_joint() -> None:
     data = replace(honest()[1], number=None, approach=None)
     moved = moved_instrument(data, np.array([2e-3, 0.0, 0.0]))
-    (notice,) = told(moved)
+    (notice,) = notices_of(moved)
     assert (notice.code, notice.level) == ("instrument-moved", "warning")
     assert notice.message.startswith(f"From configuration {FIRST_MOVED + 1} on, all readings stand 1.9")
     assert notice.message.endswith("the order of the file was taken for that of measurement. If it is, number them so.")
-    assert told(data) == []
-    assert told(moved.of_configurations(np.argsort(data.joints[:, 1]))) == []
+    assert notices_of(data) == []
+    assert notices_of(moved.of_configurations(np.argsort(data.joints[:, 1]))) == []
     sorted_first = data.of_configurations(np.argsort(-data.joints[:, 1]))
     late = moved_instrument(sorted_first, np.array([2e-3, 0.0, 0.0]))
-    assert told(late) == []
-    (notice,) = told(replace(late, number=np.arange(float(late.configurations))))
+    assert notices_of(late) == []
+    (notice,) = notices_of(replace(late, number=np.arange(float(late.configurations))))
     assert notice.level == "error"
     assert "Joint 2 moved on with the order of measurement" in notice.message
 

@@ -45,7 +45,7 @@ def measured(robot: Robot, poses: int, repeatability_deg: float, rng: np.random.
 def inside(fit: Fit, robot: Robot) -> list[bool]:
     """Return which informed parameters are within 1.96 deviations of the truth, and coordinates of predictions."""
     own = [fit.robot.parameters[n] for n in fit.free.names if fit.robot.parameters[n].group in GEOMETRIC.groups]
-    found = [
+    within = [
         abs(p.value - robot.values[p.name]) < 1.96 * p.deviation
         for p in own
         if p.deviation is not None and (p.informed or 0.0) > 0.5
@@ -55,7 +55,7 @@ def inside(fit: Fit, robot: Robot) -> list[bool]:
     J = fit.robot.position_jacobian(kinematics, q, fit.free.names).reshape(len(fit.free.names), -1).T
     apart = kinematics.position.reshape(-1) - robot.forward_kinematics(q, "a").position.reshape(-1)
     deviation = np.sqrt(np.einsum("ij,jk,ik->i", J, fit.covariance, J))
-    return [*found, *(np.abs(apart) < 1.96 * deviation).tolist()]
+    return [*within, *(np.abs(apart) < 1.96 * deviation).tolist()]
 
 
 def with_outliers(data: Dataset, share: float, rng: np.random.Generator, one_sided: bool = False) -> Dataset:
@@ -67,32 +67,32 @@ def with_outliers(data: Dataset, share: float, rng: np.random.Generator, one_sid
 
 @pytest.mark.parametrize("declared", [True, False])
 def test_targets_of_a_configuration_share_the_error_of_its_joints(declared: bool) -> None:
-    rng, found = np.random.default_rng(11), []
+    rng, within = np.random.default_rng(11), []
     errors = []
     for _ in range(12):
         robot = true_robot(rng)
         data = measured(robot, 40, 0.02, rng)
         fit = identify(load_robot("irb120"), data if declared else replace(data, sigma=None), GEOMETRIC)
-        found += inside(fit, robot)
+        within += inside(fit, robot)
         errors.append(np.degrees(fit.joint_error).mean())
         assert fit.sigma["position"] == pytest.approx(SIGMA, rel=0.3)
         assert fit.excess == 1.0
         assert not fit.scattered
     assert np.mean(errors) == pytest.approx(0.02, rel=0.1)
-    assert 0.91 < np.mean(found) < 0.99  # 0.79 where targets count as independent
+    assert 0.91 < np.mean(within) < 0.99  # 0.79 where targets count as independent
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy", "l1"])
 def test_intervals_hold_among_outliers_to_all_sides(loss: Loss) -> None:
-    rng, found = np.random.default_rng(12), []
+    rng, within = np.random.default_rng(12), []
     for _ in range(8):
         robot = true_robot(rng)
         data = with_outliers(measured(robot, 40, 0.0, rng), 0.3, rng)
         fit = identify(load_robot("irb120"), data, GEOMETRIC, loss=loss)
         assert fit.scattered
         assert check_one_sided(fit, data) == []
-        found += inside(fit, robot)
-    assert 0.9 < np.mean(found) < 0.99
+        within += inside(fit, robot)
+    assert 0.9 < np.mean(within) < 0.99
 
 
 def test_outliers_to_one_side_are_told() -> None:
@@ -134,7 +134,7 @@ def test_targets_read_on_separate_visits_share_no_error() -> None:
 
 
 def test_dropped_parameters_leave_intervals_that_hold() -> None:
-    rng, found = np.random.default_rng(17), []
+    rng, within = np.random.default_rng(17), []
     for _ in range(4):
         robot = true_robot(rng)
         fit = identify(load_robot("irb120"), measured(robot, 40, 0.02, rng), GEOMETRIC, redundancy="drop")
@@ -142,9 +142,9 @@ def test_dropped_parameters_leave_intervals_that_hold() -> None:
         kinematics = fit.robot.forward_kinematics(q, "a")
         J = fit.robot.position_jacobian(kinematics, q, fit.free.names).reshape(len(fit.free.names), -1).T
         apart = kinematics.position.reshape(-1) - robot.forward_kinematics(q, "a").position.reshape(-1)
-        found += (np.abs(apart) < 1.96 * np.sqrt(np.einsum("ij,jk,ik->i", J, fit.covariance, J))).tolist()
+        within += (np.abs(apart) < 1.96 * np.sqrt(np.einsum("ij,jk,ik->i", J, fit.covariance, J))).tolist()
         assert np.degrees(fit.joint_error).max() == pytest.approx(0.02, rel=0.2)
-    assert np.mean(found) > 0.88
+    assert np.mean(within) > 0.88
 
 
 def test_what_errors_of_the_joints_do_not_explain_is_taken_from_the_scatter() -> None:
@@ -161,13 +161,13 @@ def test_postures_visited_again_tell_the_repeatability() -> None:
     robot = true_robot(rng)
     q = np.repeat(robot.random_configurations(8, rng), 30, axis=0)
     data = Dataset.of(q, read(robot, q, 0.01, rng), targets=[*TARGETS], sigma=SIGMA)
-    found = repeatability(data, SIGMA)
-    assert found is not None
-    assert (found.postures, found.visits) == (8, 240)
+    estimate = repeatability(data, SIGMA)
+    assert estimate is not None
+    assert (estimate.postures, estimate.visits) == (8, 240)
     exact = np.array([robot.world_poses(q, name)[0] for name in TARGETS])
     off = np.radians(0.01) * np.random.default_rng(0).standard_normal(q.shape)
     lengths = np.linalg.norm(np.array([robot.world_poses(q + off, name)[0] for name in TARGETS]) - exact, axis=2)
-    assert found.rp == pytest.approx(lengths.mean() + 3 * lengths.std(), rel=0.15)
+    assert estimate.rp == pytest.approx(lengths.mean() + 3 * lengths.std(), rel=0.15)
 
 
 def test_visits_of_one_configuration_tell_it_too_and_single_ones_do_not() -> None:
@@ -183,7 +183,7 @@ def test_visits_of_one_configuration_tell_it_too_and_single_ones_do_not() -> Non
         position=np.concatenate([once.position, read(robot, q, 0.01, rng).reshape(-1, 3)]),
         visit=np.repeat([1, 2], len(once.target)),
     )
-    found = repeatability(twice, SIGMA)
-    assert found is not None
-    assert (found.postures, found.visits) == (30, 60)
-    assert found.rp == pytest.approx(0.3e-3, rel=0.3)
+    estimate = repeatability(twice, SIGMA)
+    assert estimate is not None
+    assert (estimate.postures, estimate.visits) == (30, 60)
+    assert estimate.rp == pytest.approx(0.3e-3, rel=0.3)

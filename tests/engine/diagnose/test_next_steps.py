@@ -57,7 +57,7 @@ def elastic(robot: str = "irb120", poses: int = POSES, worn: str = "", repeatabi
     return replace(measure(Twin(true, joints), reached, NOISE, rng), joints=q)
 
 
-def slipped(data: Dataset, entry_errors: Sequence[tuple[int, int, float]]) -> Dataset:
+def with_entry_errors(data: Dataset, entry_errors: Sequence[tuple[int, int, float]]) -> Dataset:
     """Return data in which joints of configurations are written down wrong: index, joint from 1, and by how much."""
     joints = data.joints.copy()
     for c, joint, degrees in entry_errors:
@@ -95,10 +95,10 @@ def test_a_geometric_model_of_an_elastic_robot_is_told_to_be_elastic() -> None:
     old, new = (known(known(run.validation).position).mean for run in (before, after))
     assert step.gain == pytest.approx(old - new, rel=0.2)
     assert not any(other.code == "measure-again" for other in before.next)  # large where the arm sags, and not wrong
-    assert before.summary()["next"] == [one.summary() for one in before.next]
+    assert before.summary()["next"] == [next_step.summary() for next_step in before.next]
     text = before.lines()
     place = text.index(step.line)
-    assert text[place : place + len(before.next)] == [one.line for one in before.next]
+    assert text[place : place + len(before.next)] == [next_step.line for next_step in before.next]
     assert check("irb120", elastic()).summary()["next"][0]["code"] == "other-model"
     frames = first(elastic(), "frames")
     assert (frames.code, "`model=geometric`" in frames.message) == ("other-model", True)
@@ -119,7 +119,10 @@ def with_one_reading_off() -> Dataset:
 
 def test_what_is_off_is_named_with_how_far_and_is_no_instrument_that_moved() -> None:
     for data, words in (
-        (slipped(elastic(), [(17, 3, 1.0)]), ["joint 3 of configuration 18 looks off by about 1 deg", "`without=18`"]),
+        (
+            with_entry_errors(elastic(), [(17, 3, 1.0)]),
+            ["joint 3 of configuration 18 looks off by about 1 deg", "`without=18`"],
+        ),
         (with_one_reading_off(), ["target 2 of configuration 21 is off by 2 mm"]),
         (shifted(elastic(), 20, 21, 3.0), ["configuration 21 is off by 3 mm"]),
         (shifted(elastic(), 30, 34, 1.0), ["Measure configurations 31 to 34 again", "`without=31,32,33,34`"]),
@@ -138,8 +141,8 @@ def test_what_is_off_is_named_with_how_far_and_is_no_instrument_that_moved() -> 
 def test_a_forgotten_payload_is_named_with_its_mass_and_missing_masses_are_asked_for() -> None:
     step = first(elastic(), payload=None)
     assert step.code == "give-payload"
-    told = float(step.message.split("about ")[1].split(" kg")[0])
-    assert told == pytest.approx(LOAD.mass, rel=0.5)
+    mass = float(step.message.split("about ")[1].split(" kg")[0])
+    assert mass == pytest.approx(LOAD.mass, rel=0.5)
     assert "`payload`" in step.message
     other = first(elastic(), payload=Payload(0.3))
     assert other.code == "give-payload"
@@ -167,9 +170,9 @@ def test_a_wrong_sign_of_one_joint_is_named_and_no_other_joint(of_one: bool) -> 
         (notice,) = run.warnings
         assert notice.code == "joints-mistaken"
         assert f"{index + 1} (joint {joint}) fit with the opposite sign of this joint" in notice.message
-        said = said_next(run)
-        assert f"the sign of joint {joint} of configuration {index + 1} looks wrong" in said
-        assert "looks off" not in said
+        message = said_next(run)
+        assert f"the sign of joint {joint} of configuration {index + 1} looks wrong" in message
+        assert "looks off" not in message
 
 
 def said_next(run: DataCheck) -> str:
@@ -177,15 +180,15 @@ def said_next(run: DataCheck) -> str:
 
 
 def test_a_joint_or_slide_that_is_off_by_far_is_named_with_how_far(tmp_path: Path) -> None:
-    said = said_next(check("irb120", slipped(elastic(), [(17, 3, 40.0)])))
-    assert "joint 3 of configuration 18 looks off by about 40 deg" in said
+    message = said_next(check("irb120", with_entry_errors(elastic(), [(17, 3, 40.0)])))
+    assert "joint 3 of configuration 18 looks off by about 40 deg" in message
     (tmp_path / "track.yaml").write_text(ON_A_TRACK, encoding="utf-8")
     robot, rng = load_robot(tmp_path / "track.yaml"), np.random.default_rng(3)
     data = measure(truth_twin(robot, "random", rng), robot.random_configurations(40, rng), NOISE, rng)
     joints = data.joints.copy()
     joints[20, 0] += 0.05
-    said = said_next(check(robot, replace(data, joints=joints)))
-    assert "joint 1 of configuration 21 looks off by about 50 mm" in said
+    message = said_next(check(robot, replace(data, joints=joints)))
+    assert "joint 1 of configuration 21 looks off by about 50 mm" in message
 
 
 def test_no_joint_is_named_where_two_explain_the_readings_or_none_does() -> None:
@@ -193,16 +196,16 @@ def test_no_joint_is_named_where_two_explain_the_readings_or_none_does() -> None
     joints = data.joints.copy()
     joints[21, 4] = 0.0  # joints 4 and 6 turn about one axis
     straight = measure(twin, joints, 0.3e-3, np.random.default_rng(3))
-    said = said_next(check("irb120", slipped(straight, [(21, 4, 10.0)])))
-    assert "configuration 22 is off by" in said
-    assert "joint 4" not in said
-    said = said_next(check("irb120", slipped(data, [(10, 2, 15.0), (10, 5, -30.0)])))
-    assert "configuration 11 is off by" in said
-    assert "of configuration 11 looks off" not in said
+    message = said_next(check("irb120", with_entry_errors(straight, [(21, 4, 10.0)])))
+    assert "configuration 22 is off by" in message
+    assert "joint 4" not in message
+    message = said_next(check("irb120", with_entry_errors(data, [(10, 2, 15.0), (10, 5, -30.0)])))
+    assert "configuration 11 is off by" in message
+    assert "of configuration 11 looks off" not in message
 
 
 def test_several_rows_are_found_behind_each_other_and_behind_the_wrong_model() -> None:
-    rows = slipped(elastic(), [(7, 2, 1.0), (30, 5, -1.0), (55, 4, 1.0)])
+    rows = with_entry_errors(elastic(), [(7, 2, 1.0), (30, 5, -1.0), (55, 4, 1.0)])
     for model in ("elastic", "geometric"):
         step = first(rows, model)
         assert step.code == "measure-again"
@@ -250,7 +253,7 @@ def test_a_check_says_what_comes_next() -> None:
     (good,) = check("irb120", rigid).next
     assert good.code == "calibrate"
     assert [step.code for step in check(rigid).next] == ["check-robot"]
-    row, model = check("irb120", slipped(elastic(), [(17, 3, 1.0)])).next
+    row, model = check("irb120", with_entry_errors(elastic(), [(17, 3, 1.0)])).next
     assert {row.code, model.code} == {"measure-again", "other-model"}
     again = row if row.code == "measure-again" else model
     assert "joint 3 of configuration 18" in again.message
@@ -279,14 +282,14 @@ def test_steps_are_ordered_by_their_gain_and_three_at_most() -> None:
 
 
 def test_what_is_left_out_is_left_out_of_everything() -> None:
-    data = slipped(elastic(), [(17, 3, 1.0)])
+    data = with_entry_errors(elastic(), [(17, 3, 1.0)])
     left = LeftOver.of(identify(load_robot("irb120").with_payload(LOAD), data, named_model("geometric")), data)
     off = off_configurations(left)
     assert 17 in off.indices
     assert off.left < 0.9
-    rest = left.without(off.indices)
-    assert rest.problem.data.configurations == data.configurations - len(off.indices)
-    assert rest.freedom == len(rest.residual) - rest.basis.shape[1]
+    remaining = left.without(off.indices)
+    assert remaining.problem.data.configurations == data.configurations - len(off.indices)
+    assert remaining.freedom == len(remaining.residual) - remaining.basis.shape[1]
     assert known(explanation(left, off.indices)).cause == "compliance"
     assert left.without(()) is left
 
@@ -312,9 +315,9 @@ def test_too_few_readings_are_told_from_a_choice_that_tried_everything_and_from_
     tried = replace(fit, model=replace(fit.model, name="auto", tried=("backlash",)))
     assert "cross-validation found no other joint effect" in _end(LeftOver.of(tried, data)).message
     monkeypatch.setattr("truearm.engine.diagnose.next_steps.has_curves", lambda _: True)
-    said = _end(LeftOver.of(fit, data)).message
-    assert "The curves leave too few equations" in said
-    assert "too few readings" not in said
+    message = _end(LeftOver.of(fit, data)).message
+    assert "The curves leave too few equations" in message
+    assert "too few readings" not in message
 
 
 def test_what_is_not_known_of_curves_is_said() -> None:

@@ -62,7 +62,7 @@ def read_otherwise(way: str) -> Dataset:
     data = sound()
     R = rotation_from_quaternion(np.asarray(data.quaternion))
     numbers = angles(R)
-    made = {
+    computed = {
         "columns reversed": about(numbers[:, ::-1], "zyx"),
         "fixed for moving": about(numbers, "xyz"),
         "zyz": about(numbers, "zyz"),
@@ -73,7 +73,7 @@ def read_otherwise(way: str) -> Dataset:
         "from the wrong end": rotation_from_quaternion(np.asarray(data.quaternion)[:, [3, 0, 1, 2]]),
         "from the other end": rotation_from_quaternion(np.asarray(data.quaternion)[:, [1, 2, 3, 0]]),
     }[way]
-    return replace(data, quaternion=quaternion_from_rotation(made))
+    return replace(data, quaternion=quaternion_from_rotation(computed))
 
 
 @pytest.mark.parametrize(
@@ -85,9 +85,9 @@ def read_otherwise(way: str) -> Dataset:
         ("degrees", "orientation-order", "angles about zyx of moving axes, but in radians that were called degrees"),
         ("rotation vector", "orientation-order", "not a rotation vector but angles about zyx of moving axes"),
         ("angles for a vector", "orientation-order", "not angles about zyx of moving axes but a rotation vector"),
-        ("transposed", "quaternion-order", "they turn the other way round, as transposed matrices do"),
-        ("from the wrong end", "quaternion-order", "w, x, y, z were taken for x, y, z, w"),
-        ("from the other end", "quaternion-order", "in the order x, y, z, w"),
+        ("transposed", "orientation-order", "they turn the other way round, as transposed matrices do"),
+        ("from the wrong end", "orientation-order", "w, x, y, z were taken for x, y, z, w"),
+        ("from the other end", "orientation-order", "in the order x, y, z, w"),
     ],
 )
 def test_the_convention_that_was_meant_is_named(way: str, code: str, words: str) -> None:
@@ -108,15 +108,15 @@ def test_a_rotation_vector_that_was_read_as_angles_is_named() -> None:
 
 
 def test_a_check_says_it_too_and_nothing_of_sound_orientations() -> None:
-    for data, codes in ((sound(), []), (read_otherwise("from the other end"), ["quaternion-order"])):
+    for data, codes in ((sound(), []), (read_otherwise("from the other end"), ["orientation-order"])):
         assert [n.code for n in check(ROBOT, data).warnings if n.level == "error"] == codes
 
 
 def test_the_fit_says_the_cause() -> None:
     run = calibrate(ROBOT, read_otherwise("fixed for moving"))
     assert run.warnings[0].code == "orientation-order"
-    (told,) = [notice for notice in run.warnings if notice.code == "implausible"]
-    assert "The cause is most likely what orientation-order says" in told.message
+    (warning,) = [notice for notice in run.warnings if notice.code == "implausible"]
+    assert "The cause is most likely what orientation-order says" in warning.message
 
 
 def test_honest_orientations_are_left_alone() -> None:
@@ -153,13 +153,13 @@ def orientations(rows: list[int]) -> np.ndarray:
 
 def test_a_single_orientation_that_is_off_is_doubted_and_not_its_position() -> None:
     data = turned([4], orientations([4]) @ rotation_from_vector(np.radians([[1.0, 2.0, -2.0]])))
-    found = check(ROBOT, data)
-    (notice,) = found.warnings
+    result = check(ROBOT, data)
+    (notice,) = result.warnings
     assert (notice.code, notice.level) == ("orientation-outliers", "warning")
     assert notice.message.startswith(
         "1 orientation is far off, and the positions are not (configuration/target): 5/1 (2.99 deg)"
     )
-    assert [step.code for step in found.next] == ["see-warning", "calibrate"]
+    assert [step.code for step in result.next] == ["see-warning", "calibrate"]
     run = calibrate(ROBOT, data, train=15)
     codes = {notice.code for notice in run.warnings}
     assert "orientation-outliers" in codes
@@ -190,7 +190,7 @@ def test_rows_of_another_convention_are_named_beside_one_that_is_off() -> None:
     assert single.code == "orientation-outliers"
     assert "13/1" in single.message
     (inverse,) = check(ROBOT, turned([7], np.swapaxes(orientations([7]), 1, 2))).warnings
-    assert (inverse.code, inverse.level) == ("quaternion-order", "error")
+    assert (inverse.code, inverse.level) == ("orientation-order", "error")
 
 
 def test_noise_of_orientations_that_was_declared_is_allowed() -> None:

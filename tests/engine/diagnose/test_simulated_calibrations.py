@@ -36,13 +36,13 @@ def read(repeat: float = 0.0, poses: int = 40, seed: int = 1) -> tuple[Twin, Dat
     rng = np.random.default_rng(seed)
     twin = truth_twin(ROBOT, "random", rng)
     joints = ROBOT.random_configurations(poses, rng)
-    there = joints + repeat * rng.standard_normal(joints.shape)
-    return twin, replace(measure(twin, there, 0.05e-3, rng), joints=joints)
+    driven = joints + repeat * rng.standard_normal(joints.shape)
+    return twin, replace(measure(twin, driven, 0.05e-3, rng), joints=joints)
 
 
 def informed(fit: Fit, names: Sequence[str]) -> NDArray[np.bool_]:
-    found = [fit.robot.parameters[name] for name in names]
-    return np.array([p.group not in PLACES and (p.informed or 0.0) > 0.5 for p in found])
+    parameters = [fit.robot.parameters[name] for name in names]
+    return np.array([p.group not in PLACES and (p.informed or 0.0) > 0.5 for p in parameters])
 
 
 @pytest.mark.parametrize(("repeat", "redundancy"), [(0.0, "prior"), (1.5e-4, "prior"), (0.0, "drop")])
@@ -50,41 +50,41 @@ def test_where_all_is_linear_it_agrees_with_the_covariance(repeat: float, redund
     _, data = read(repeat)
     fit = identify(ROBOT, data, MODEL["geometric"], redundancy=redundancy)
     assert fit.joint_error.any() == bool(repeat)
-    found = simulated_calibrations(fit, data, data, 400, priors=redundancy == "prior")
-    assert found.settled == 400
-    own = informed(fit, found.names)
+    simulated = simulated_calibrations(fit, data, data, 400, priors=redundancy == "prior")
+    assert simulated.settled == 400
+    own = informed(fit, simulated.names)
     assert own.sum() > 15
-    ratio = (found.deviation / found.linear_deviation)[own]
+    ratio = (simulated.deviation / simulated.linear_deviation)[own]
     assert 0.85 < ratio.min() < ratio.max() < 1.15
-    assert 0.935 < found.coverage[own].mean() < 0.965
-    held_out = known(found.held_out)
+    assert 0.935 < simulated.coverage[own].mean() < 0.965
+    held_out = known(simulated.held_out)
     assert held_out.mean == pytest.approx(held_out.linear_mean, rel=0.06)
-    assert (found.workspace is None) == (redundancy == "drop")
-    assert check_linear(fit, found) == []
+    assert (simulated.workspace is None) == (redundancy == "drop")
+    assert check_linear(fit, simulated) == []
 
 
 def test_its_intervals_hold_the_truth() -> None:
-    held, count = 0, 0
+    within, count = 0, 0
     for seed in range(4):
         twin, data = read(seed=seed)
         fit = identify(ROBOT, data, MODEL["geometric"])
-        found = simulated_calibrations(fit, data, data, 200, priors=True, seed=seed)
-        own = informed(fit, found.names)
-        truth = np.array([twin.robot.values.get(name, np.nan) for name in found.names])
-        low, high = found.interval_95.T
+        simulated = simulated_calibrations(fit, data, data, 200, priors=True, seed=seed)
+        own = informed(fit, simulated.names)
+        truth = np.array([twin.robot.values.get(name, np.nan) for name in simulated.names])
+        low, high = simulated.interval_95.T
         known = own & np.isfinite(truth)
-        held += int(((low <= truth) & (truth <= high))[known].sum())
+        within += int(((low <= truth) & (truth <= high))[known].sum())
         count += int(known.sum())
     assert count > 40
-    assert 0.85 < held / count <= 1.0
+    assert 0.85 < within / count <= 1.0
 
 
 def test_residuals_that_joints_do_not_explain_are_drawn_as_they_are() -> None:
     _, data = campaign("irb120", 60, 0.02e-3, 1, truth="tracker-triangular")
     fit = identify(ROBOT, data, MODEL["geometric"])
     assert fit.scattered
-    found = simulated_calibrations(fit, data, data, 200, priors=True)
-    ratio = (found.deviation / found.linear_deviation)[informed(fit, found.names)]
+    simulated = simulated_calibrations(fit, data, data, 200, priors=True)
+    ratio = (simulated.deviation / simulated.linear_deviation)[informed(fit, simulated.names)]
     assert 0.6 < ratio.min() < ratio.max() < 1.3
 
 
@@ -93,18 +93,18 @@ def test_lengths_alone_are_simulated_too() -> None:
     twin = truth_twin(ROBOT, "random", rng)
     data = measured_with(named_device("ballbar"), ROBOT, twin, 80, rng)
     fit = identify(ROBOT, data, MODEL["geometric"])
-    found = simulated_calibrations(fit, data, data, 100, priors=True)
-    assert found.settled == 100
-    assert known(found.held_out).mean == pytest.approx(known(found.held_out).linear_mean, rel=0.3)
+    simulated = simulated_calibrations(fit, data, data, 100, priors=True)
+    assert simulated.settled == 100
+    assert known(simulated.held_out).mean == pytest.approx(known(simulated.held_out).linear_mean, rel=0.3)
 
 
 def test_intervals_that_are_too_narrow_and_lost_trials_are_told() -> None:
     _, data = read()
     fit = identify(ROBOT, data, MODEL["geometric"])
-    found = simulated_calibrations(fit, data, data, 100, priors=True)
+    simulated = simulated_calibrations(fit, data, data, 100, priors=True)
 
     def lost(factor: float, settled: int) -> SimulatedCalibrations:
-        return replace(found, error=factor * found.error[:settled], stated=found.stated[:settled])
+        return replace(simulated, error=factor * simulated.error[:settled], stated=simulated.stated[:settled])
 
     codes = [(n.code, n.level) for n in check_linear(fit, lost(2.5, 100))]
     assert codes == [("intervals-too-narrow", "warning")]
@@ -116,26 +116,26 @@ def test_intervals_that_are_too_narrow_and_lost_trials_are_told() -> None:
 
 def test_the_job_puts_both_intervals_side_by_side(tmp_path: Path) -> None:
     _, data = read()
-    said: list[str] = []
-    run = calibrate(ROBOT, data, monte_carlo=100, out=tmp_path / "out", progress=said.append)
-    found = run.result()["monte_carlo"]
-    assert (found["trials"], found["settled"], found["seed"]) == (100, 100, 0)
-    row = next(row for row in found["parameters"] if row["name"] == "a_3")
+    messages: list[str] = []
+    run = calibrate(ROBOT, data, monte_carlo=100, out=tmp_path / "out", progress=messages.append)
+    content = run.result()["monte_carlo"]
+    assert (content["trials"], content["settled"], content["seed"]) == (100, 100, 0)
+    row = next(row for row in content["parameters"] if row["name"] == "a_3")
     low, high = row["interval_95"]
     assert low < run.robot.values["a_3"] * 1e3 < high
     assert row["linear_interval_95"][1] - row["linear_interval_95"][0] == pytest.approx(
         3.919928 * row["linear_deviation"]
     )
     assert high - low == pytest.approx(3.92 * row["linear_deviation"], rel=0.3)
-    assert 0.8 < found["coverage"] <= 1.0
-    assert [words for words in said if words.endswith("100 of 100") and "[####################]" in words]
+    assert 0.8 < content["coverage"] <= 1.0
+    assert [words for words in messages if words.endswith("100 of 100") and "[####################]" in words]
     assert any(line.startswith("Monte Carlo: in 100 simulated") for line in run.lines())
     page = (tmp_path / "out" / "report.html").read_text()
     assert 'id="coverage"' in page
     assert 'id="intervals"' in page
     assert "monte_carlo=100" in run.command
     again = calibrate(ROBOT, data, monte_carlo=100).result()["monte_carlo"]
-    assert again == found
+    assert again == content
     assert "monte_carlo" not in calibrate(ROBOT, data).result()
 
 

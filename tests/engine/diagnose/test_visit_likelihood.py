@@ -27,8 +27,8 @@ def missing_by(deviation: float, seed: int, *, each_target: bool = False) -> Dat
     position = data.position.copy()
     for visit in range(len(data.targets) if each_target else 1):
         missed = np.radians(deviation) * rng.standard_normal(data.joints.shape)
-        mine = data.target == visit if each_target else np.ones(len(data.target), dtype=bool)
-        position[mine] = measure(twin, data.joints + missed, NOISE, rng).position[mine]
+        rows = data.target == visit if each_target else np.ones(len(data.target), dtype=bool)
+        position[rows] = measure(twin, data.joints + missed, NOISE, rng).position[rows]
     return replace(data, position=position)
 
 
@@ -37,8 +37,8 @@ def left_of(data: Dataset) -> LeftOver:
 
 
 def of_one_target(data: Dataset) -> Dataset:
-    one = data.of_readings(data.target == 0)
-    return replace(one, targets=("1",))
+    dataset = data.of_readings(data.target == 0)
+    return replace(dataset, targets=("1",))
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.003, 0.02])

@@ -156,8 +156,8 @@ def test_a_fit_of_other_parameters_or_that_began_wrong_is_judged_by_the_table() 
 
 
 def test_the_check_names_the_robot_where_a_entry_error_would_explain_it_too() -> None:
-    for real, given in (("ur5", "ur10"), ("puma560", "irb120")):
-        notices = check(given, campaign_of(load_robot(real), 30, 3)[1]).warnings
+    for real, value in (("ur5", "ur10"), ("puma560", "irb120")):
+        notices = check(value, campaign_of(load_robot(real), 30, 3)[1]).warnings
         assert [n.code for n in notices if n.level == "error"] == ["wrong-robot"]
         assert f"{real} of the library fits them" in notices[0].message
 
@@ -180,17 +180,17 @@ def test_wrong_data_are_said_before_the_robot_is_doubted() -> None:
 def test_one_factor_in_all_lengths_is_a_wrong_length_of_the_measurement() -> None:
     """Robots within their priors, read by an instrument that takes a millimetre for 0.985 mm, or for what it is."""
     robot = load_robot("irb120")
-    told: dict[float, list[str]] = {1.0: [], 1.015: []}
+    codes: dict[float, list[str]] = {1.0: [], 1.015: []}
     for seed in range(6):
         rng = np.random.default_rng(seed)
         data = measure(truth_twin(robot, "random", rng), robot.random_configurations(30, rng), 5e-5, rng)
-        for factor in told:
-            found = doubts(robot, replace(data, position=factor * data.position))
-            assert all(n.level == "error" for n in found)
-            told[factor] += [n.code for n in found]
-    assert told[1.0] == []
-    assert len(told[1.015]) >= 5
-    assert set(told[1.015]) == {"lengths-scaled", "wrong-robot"}
+        for factor in codes:
+            warnings = doubts(robot, replace(data, position=factor * data.position))
+            assert all(n.level == "error" for n in warnings)
+            codes[factor] += [n.code for n in warnings]
+    assert codes[1.0] == []
+    assert len(codes[1.015]) >= 5
+    assert set(codes[1.015]) == {"lengths-scaled", "wrong-robot"}
 
 
 def test_a_scale_that_is_known_is_known_of_lengths() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from truearm.engine.base.errors import Notice
-from truearm.engine.base.units import Marked, said_of
+from truearm.engine.base.units import Marked, mark_lines
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.document.document import Block, Table, detail, each, say, under
 from truearm.engine.document.records import Record, first_screen
@@ -24,7 +24,7 @@ class Found(Record):
     def blocks(self) -> Iterator[Block]:
         yield each("parts", (say(f"answer {k}", number=k) for k in range(self.answer)))
         yield detail("explained", "at length", why="so")
-        yield under("table", [Table(("a", "b"), [("1", "22"), ("333", "4")], held={"rows": 2}, is_detail=True)])
+        yield under("table", [Table(("a", "b"), [("1", "22"), ("333", "4")], in_json={"rows": 2}, is_detail=True)])
 
 
 NOTICES = (
@@ -74,7 +74,7 @@ def test_it_has_ten_lines_at_most_and_counts_the_rest(
     found = Found(answer, NOTICES[:notices], STEPS[:steps], marked)
     shown, everything = first_screen(found), found.lines()
     assert len(shown) < 10  # the tenth says where files are
-    assert said_of(marked) == shown[: len(marked)]
+    assert mark_lines(marked) == shown[: len(marked)]
     assert "answer 0" in shown
     assert sum("(c)" in line for line in shown) == (notices > 2)
     if shown != everything:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from tests.engine.fit.test_joint_effects import MODEL, told
+from tests.engine.fit.test_joint_effects import MODEL, messages_of
 
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.fit import identify
@@ -37,7 +37,7 @@ def test_what_a_twin_does_is_found_without_any_mass() -> None:
         found = fit.robot.parameters[name]
         assert found.deviation is not None
         assert abs(found.value - true.values[name]) < 4.0 * found.deviation, name
-    codes = told(fit)
+    codes = messages_of(fit)
     assert "no-loads" not in codes
     assert "bearing-assumed" not in codes
     assert "bending_zx_1" in codes["effects-uninformed"]  # gravity is along the axis of joint 1 at every angle

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.fit.design import (
     INDICES,
@@ -24,7 +24,7 @@ from truearm.engine.fit.design import (
 from truearm.engine.robot.chain import Array
 
 
-def told(rows: Array, chosen: list[int], known: Array, interest: int) -> float:
+def information_of(rows: Array, chosen: list[int], known: Array, interest: int) -> float:
     """Return minus the logarithm of the determinant of the covariance of the parameters of interest."""
     J = rows[chosen].reshape(-1, rows.shape[2])
     covariance = np.linalg.inv(known + J.T @ J)
@@ -42,11 +42,11 @@ def test_hardly_any_choice_tells_more() -> None:
             rng = np.random.default_rng(seed)
             rows, known = rng.normal(size=(12, 2, 4)), 0.01 * np.eye(4)
             chosen = most_informative(rows, 4, known, OfInterest(interest))
-            every = np.array([told(rows, list(c), known, interest) for c in combinations(range(12), 4)])
+            every = np.array([information_of(rows, list(c), known, interest) for c in combinations(range(12), 4)])
             assert len(set(chosen)) == 4
-            found = told(rows, chosen, known, interest)
-            assert found > every.max() - 0.1, (interest, seed)
-            assert np.mean(every > found) < 0.02, (interest, seed)
+            result = information_of(rows, chosen, known, interest)
+            assert result > every.max() - 0.1, (interest, seed)
+            assert np.mean(every > result) < 0.02, (interest, seed)
 
 
 @pytest.mark.parametrize("name", INDICES)
@@ -58,9 +58,9 @@ def test_every_index_comes_near_to_the_best_choice(name: str) -> None:
         every = np.array([value(known + total_of(rows, c)) for c in combinations(range(12), 5)])
         chosen = most_informative(rows, 5, known, INDICES[name])
         assert len(set(chosen)) == 5
-        found = value(known + total_of(rows, chosen))
+        result = value(known + total_of(rows, chosen))
         # The condition number is neither concave nor smooth: exchanges of one get stuck sooner.
-        assert np.mean(every > found + 1e-12) < (0.2 if name == "O2" else 0.02), seed
+        assert np.mean(every > result + 1e-12) < (0.2 if name == "O2" else 0.02), seed
 
 
 def test_with_all_pairs_exchanged_the_choice_is_often_the_best() -> None:
@@ -68,8 +68,8 @@ def test_with_all_pairs_exchanged_the_choice_is_often_the_best() -> None:
         rng = np.random.default_rng(seed)
         rows, known = rng.normal(size=(9, 3, 3)), 1e-6 * np.eye(3)
         every = [float(O1().value(known + total_of(rows, c))) for c in combinations(range(9), 3)]
-        found = float(O1().value(known + total_of(rows, most_informative(rows, 3, known, O1()))))
-        assert found == pytest.approx(max(every), abs=1e-9) or sum(v > found for v in every) <= 2, seed
+        result = float(O1().value(known + total_of(rows, most_informative(rows, 3, known, O1()))))
+        assert result == pytest.approx(max(every), abs=1e-9) or sum(v > result for v in every) <= 2, seed
 
 
 @pytest.mark.parametrize("name", INDICES)
@@ -83,8 +83,8 @@ def test_no_single_exchange_and_no_random_choice_is_better(name: str) -> None:
     assert best > max(by_chance)
     if name == "O1":  # of the others, some exchange outside the promising ones may gain a little
         for place in range(10):
-            rest = chosen[:place] + chosen[place + 1 :]
-            others = [value(known + total_of(rows, [*rest, new])) for new in range(120) if new not in rest]
+            remaining = chosen[:place] + chosen[place + 1 :]
+            others = [value(known + total_of(rows, [*remaining, new])) for new in range(120) if new not in remaining]
             assert max(others) <= best + 1e-9
 
 
@@ -106,7 +106,7 @@ def test_the_promise_is_the_first_order_of_what_is_added() -> None:
     for index in (*INDICES.values(), OfInterest(2)):
         step = 1e-6
         each = step * rows.swapaxes(1, 2) @ rows
-        added = [index.value(total + one) - index.value(total - one) for one in each]
+        added = [index.value(total + each_row) - index.value(total - each_row) for each_row in each]
         promised = candidates.promise(index.slope(total))
         assert promised == pytest.approx(np.array(added) / (2 * step), rel=1e-3, abs=1e-6)
 
@@ -139,9 +139,9 @@ def test_what_only_a_nuisance_feels_is_left_out() -> None:
 
 
 def test_more_than_there_are_is_refused() -> None:
-    with refused("0 to 3"):
+    with refusing("0 to 3"):
         most_informative(np.ones((3, 1, 1)), 4, np.eye(1), O1())
-    with refused("0 to 10"):
+    with refusing("0 to 10"):
         most_informative_number(np.ones((10, 1, 1)), np.eye(1))
 
 
@@ -152,8 +152,8 @@ def test_an_orthogonal_jacobian_in_closed_form() -> None:
     rng = np.random.default_rng(0)
     Q = np.linalg.qr(rng.normal(size=(12, 3)))[0]
     J = Q * [1.0, 2.0, 4.0] @ np.linalg.qr(rng.normal(size=(3, 3)))[0]  # singular values 4, 2, 1
-    found = observability(J.T @ J, 4)
-    assert found == pytest.approx({"O1": 2.0 / 2.0, "O2": 0.25, "O3": 1.0, "O4": 0.25, "O5": 4.0 / 7.0})
+    result = observability(J.T @ J, 4)
+    assert result == pytest.approx({"O1": 2.0 / 2.0, "O2": 0.25, "O3": 1.0, "O4": 0.25, "O5": 4.0 / 7.0})
     blind = observability(np.diag([1.0, 0.0]), 1)
     assert max(blind["O3"], blind["O5"]) < 1e-100
 
@@ -195,5 +195,5 @@ def test_many_at_once_as_one_by_one() -> None:
     A = np.random.default_rng(3).normal(size=(7, 9, 4))
     M = A.swapaxes(1, 2) @ A
     for objective in (*INDICES.values(), OfInterest(2), predictions()):
-        assert objective.value(M) == pytest.approx([float(objective.value(one)) for one in M])
-        assert objective.slope(M) == pytest.approx(np.array([objective.slope(one) for one in M]))
+        assert objective.value(M) == pytest.approx([float(objective.value(matrix)) for matrix in M])
+        assert objective.slope(M) == pytest.approx(np.array([objective.slope(matrix) for matrix in M]))

@@ -69,8 +69,8 @@ def test_conventions_that_can_tilt_parallel_axes_find_the_same_robot_and_common_
 
 def test_zeros_of_the_joints_are_among_what_twists_say_twice() -> None:
     """A joint's zero turns all axes beyond it, which their own slides and tilts can do as well."""
-    held: tuple[Redundancy, ...] = another_truth("product-of-exponentials")[0].redundancies
-    involved = {member for r in held for member in r.members}
+    redundancies: tuple[Redundancy, ...] = another_truth("product-of-exponentials")[0].redundancies
+    involved = {member for r in redundancies for member in r.members}
     assert {f"theta_offset_{i}" for i in range(1, 7)} <= involved
 
 
@@ -84,9 +84,9 @@ def length(metres: float) -> str:
 def largest_changes(nominal: Robot, tilted: Robot) -> tuple[float, float]:
     """Largest change of a length [m] and of an angle or a direction [deg] in the rows of two robots."""
     lengths, angles = [0.0], [0.0]
-    for one, other in zip(nominal.joints, tilted.joints, strict=True):
-        for column, unit in nominal.convention.row_units(one.kind).items():
-            change = abs(other.row.get(column, 0.0) - one.row.get(column, 0.0))
+    for first, other in zip(nominal.joints, tilted.joints, strict=True):
+        for column, unit in nominal.convention.row_units(first.kind).items():
+            change = abs(other.row.get(column, 0.0) - first.row.get(column, 0.0))
             (lengths if unit == "m" else angles).append(change if unit == "m" else math.degrees(change))
     return max(lengths), max(angles)
 
@@ -103,8 +103,8 @@ def test_the_guide_shows_what_a_tilt_does_to_the_numbers(name: str, monkeypatch:
     for tilt in TILTS:
         real = robot.with_values({"beta_3": math.radians(tilt)})
         tilted = converted(real, name)
-        for one, other in zip(tilted.world_poses(q), real.world_poses(q), strict=True):
-            np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
+        for first, other in zip(tilted.world_poses(q), real.world_poses(q), strict=True):
+            np.testing.assert_allclose(first, other, rtol=0, atol=1e-9)
         twin, data = campaign_of(real, "nominal", 50, 0)
         fit = identify(nominal, data, GEOMETRIC)
         left = errors_of(fit.robot, more_of(twin, 100, 0.0, 12)).position_norms.mean()

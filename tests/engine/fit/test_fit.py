@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 from tests.simulated import campaign, more_of
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Status, identify
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import MODELS
 from truearm.engine.fit.problem import Problem
@@ -97,7 +97,7 @@ def test_the_sum_of_distances_is_minimal() -> None:
     def total(vector: Array, problem: Problem = problem) -> float:
         return float(np.linalg.norm(problem.residual(vector).reshape(-1, 3), axis=1).sum())
 
-    x, other = (np.array([one.robot.values[n] for n in one.free.names]) for one in (fit, plain))
+    x, other = (np.array([either.robot.values[n] for n in either.free.names]) for either in (fit, plain))
     best = total(x)
     rng = np.random.default_rng(0)
     scale = 1.0 / np.linalg.norm(problem.linearised(x)[1], axis=0)
@@ -118,19 +118,19 @@ def test_bounds_hold_and_are_reported() -> None:
     assert same.status is Status.CONVERGED
     for name in free.free.names:
         assert same.robot.values[name] == pytest.approx(free.robot.values[name], abs=1e-8), name
-    held = identify(load_robot("irb120"), data, GEOMETRIC, bounds=bounds_of(a_3=0))
-    a_3 = held.robot.parameters["a_3"]  # at its bound, and not uncertain
+    bounded = identify(load_robot("irb120"), data, GEOMETRIC, bounds=bounds_of(a_3=0))
+    a_3 = bounded.robot.parameters["a_3"]  # at its bound, and not uncertain
     assert (a_3.value, a_3.deviation, a_3.informed) == (a_3.nominal, None, None)
-    assert held.covariance[held.free.names.index("a_3")].tolist() == [0.0] * len(held.free.names)
+    assert bounded.covariance[bounded.free.names.index("a_3")].tolist() == [0.0] * len(bounded.free.names)
 
 
 def test_the_order_of_readings_does_not_matter() -> None:
     twin, data = campaign("ur5", 25, 0.05e-3, 6)
     shuffled = data.of_configurations(np.random.default_rng(1).permutation(25))
     q = twin.robot.random_configurations(20, np.random.default_rng(2))
-    one, other = (identify(load_robot("ur5"), d, GEOMETRIC).robot for d in (data, shuffled))
-    for target in one.targets:
-        before, after = (robot.world_poses(q, target.name)[0] for robot in (one, other))
+    first, other = (identify(load_robot("ur5"), d, GEOMETRIC).robot for d in (data, shuffled))
+    for target in first.targets:
+        before, after = (robot.world_poses(q, target.name)[0] for robot in (first, other))
         np.testing.assert_allclose(before, after, atol=1e-10, rtol=0)
 
 
@@ -273,13 +273,13 @@ def standing_still(twin: Twin, data: Dataset, joints: list[int]) -> Dataset:
 
 def test_too_few_equations_without_priors_are_refused_and_bounds_that_a_held_parameter_cannot_keep() -> None:
     _, data = campaign("irb120", 4, 0.0, 2)
-    with refused("fewer equations than unknowns", "36 equations for 40 unknown", "at least 14", "`redundancy=prior`"):
+    with refusing("fewer equations than unknowns", "36 equations for 40 unknown", "at least 14", "`redundancy=prior`"):
         identify(load_robot("irb120"), data, GEOMETRIC, redundancy="drop")
     _, data = campaign("irb120", 40, 0.05e-3, 2)
     bounds = Bounds.model_validate(
         {"truearm": "truearm-bounds/1", "units": {"length": "mm", "angle": "deg"}, "between": {"d_3": [1, 2]}}
     )
-    with refused("my.yaml, d_3: the bounds exclude the nominal value of a redundant"):
+    with refusing("my.yaml, d_3: the bounds exclude the nominal value of a redundant"):
         identify(load_robot("irb120"), data, GEOMETRIC, redundancy="drop", bounds=bounds, bounds_file="my.yaml")
 
 
@@ -288,8 +288,10 @@ def test_joints_that_never_moved_are_a_loss_of_rank(still: list[int]) -> None:
     twin, data = campaign("irb120", 40, 0.05e-3, 2)
     data = standing_still(twin, data, still)
     for redundancy in get_args(Redundant):
-        held = Held(twin.robot.base) if redundancy == "none" else NOTHING_HELD  # it needs something that is known
-        fit = identify(load_robot("irb120"), data, GEOMETRIC, redundancy=redundancy, held=held)
+        fixed = (
+            FixedPlaces(twin.robot.base) if redundancy == "none" else NOTHING_FIXED
+        )  # it needs something that is known
+        fit = identify(load_robot("irb120"), data, GEOMETRIC, redundancy=redundancy, fixed=fixed)
         assert fit.status is Status.RANK_LOSS, redundancy
         assert fit.unobservable
         assert all(fit.parameter_status(name) == "not-determined" for name in fit.unobservable)

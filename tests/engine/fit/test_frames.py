@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 from tests.simulated import campaign
 
 from truearm.engine.data.dataset import Dataset
@@ -19,11 +19,11 @@ from truearm.engine.robot.transform import Transform, quaternion_from_rotation
 def test_the_closed_form_finds_base_and_targets_of_a_nominal_robot() -> None:
     for name in ARMS:
         twin, data = campaign(name, 30, 0.0, 1, truth="nominal")
-        found = initial_frames(load_robot(name), data)
-        np.testing.assert_allclose(found.base.translation, twin.robot.base.translation, atol=1e-9, err_msg=name)
-        np.testing.assert_allclose(found.base.rotation, twin.robot.base.rotation, atol=1e-9, err_msg=name)
-        own = {target.parameter(axis) for target in found.targets for axis in "xyz"}
-        places = ({n: v for n, v in robot.values.items() if n in own} for robot in (found, twin.robot))
+        placed = initial_frames(load_robot(name), data)
+        np.testing.assert_allclose(placed.base.translation, twin.robot.base.translation, atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(placed.base.rotation, twin.robot.base.rotation, atol=1e-9, err_msg=name)
+        own = {target.parameter(axis) for target in placed.targets for axis in "xyz"}
+        places = ({n: v for n, v in robot.values.items() if n in own} for robot in (placed, twin.robot))
         assert next(places) == pytest.approx(next(places), abs=1e-9), name
 
 
@@ -37,9 +37,9 @@ def test_it_needs_no_hand_given_frame_wherever_the_robot_stands() -> None:
         moved = robot.with_frames(base, {"1": (0.1, -0.05, 0.12), "2": (0.0, 0.1, 0.2)})
         joints = robot.random_configurations(12, rng)
         position = np.stack([moved.world_poses(joints, t)[0] for t in ("1", "2")], axis=1)
-        found = initial_frames(robot, Dataset.of(joints, position, targets=("1", "2")))
-        np.testing.assert_allclose(found.base.translation, base.translation, atol=1e-8, err_msg=str(seed))
-        np.testing.assert_allclose(found.base.rotation, base.rotation, atol=1e-8, err_msg=str(seed))
+        placed = initial_frames(robot, Dataset.of(joints, position, targets=("1", "2")))
+        np.testing.assert_allclose(placed.base.translation, base.translation, atol=1e-8, err_msg=str(seed))
+        np.testing.assert_allclose(placed.base.rotation, base.rotation, atol=1e-8, err_msg=str(seed))
 
 
 def test_orientation_readings_place_an_arm_of_two_joints() -> None:
@@ -63,7 +63,7 @@ def test_a_calibrated_arm_is_placed_to_its_noise() -> None:
 
 def test_data_without_positions_are_refused() -> None:
     _, data = campaign("irb120", 5, 0.0, 0)
-    with refused("twin: there is no position reading", "Fill in x, y and z"):
+    with refusing("twin: there is no position reading", "Fill in x, y and z"):
         initial_frames(load_robot("irb120"), replace(data, position=np.full_like(data.position, np.nan)))
 
 

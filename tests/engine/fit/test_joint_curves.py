@@ -69,10 +69,10 @@ def test_curves_that_were_found_are_not_lost_where_noise_is_small() -> None:
 # -- stiffness
 
 Numbers = NDArray[np.intp]
-Made = tuple[Array, Array, Array, Numbers, Numbers]
+Synthetic = tuple[Array, Array, Array, Numbers, Numbers]
 
 
-def synthetic(rows: int, joints: int, variance: Array, rng: np.random.Generator, arc: float = 2 * math.pi) -> Made:
+def synthetic(rows: int, joints: int, variance: Array, rng: np.random.Generator, arc: float = 2 * math.pi) -> Synthetic:
     """Return derivatives by 5 other parameters and by curves, right sides, and joint and period of each coefficient."""
     highest = len(variance) // (2 * joints)
     F = np.column_stack(
@@ -94,15 +94,15 @@ def test_likelihood_is_that_of_the_dense_covariance() -> None:
     rng = np.random.default_rng(3)
     variance = np.repeat([9.0, 0.0, 4.0, 0.5], 4)
     A, F, z, joint, period = synthetic(120, 2, variance, rng)
-    found = curve_variances(moments_of(A, F, z), len(z), joint, period)
-    assert set(found.gains) == {0, 1}
+    estimate = curve_variances(moments_of(A, F, z), len(z), joint, period)
+    assert set(estimate.gains) == {0, 1}
 
     def dense(v: Array) -> float:
-        V = found.noise * (np.eye(len(z)) + A @ A.T) + (F * v) @ F.T
+        V = estimate.noise * (np.eye(len(z)) + A @ A.T) + (F * v) @ F.T
         return -0.5 * float(np.linalg.slogdet(V)[1] + z @ np.linalg.solve(V, z))
 
-    free = found.full
-    for i, gain in found.gains.items():
+    free = estimate.full
+    for i, gain in estimate.gains.items():
         assert gain == pytest.approx(dense(free) - dense(np.where(joint == i, 0.0, free)), abs=1e-6)
 
 
@@ -112,41 +112,41 @@ def test_variances_are_those_that_were_drawn() -> None:
     truth[60:] = 0.0  # the other joint has no curve
     ratios = []
     for _ in range(5):
-        found = curve_variances(*_given(synthetic(1500, 2, truth, rng)))
-        assert set(found.gains) == {0}
-        assert not found.variance[60:].any()
-        assert found.noise == pytest.approx(1.0, abs=0.15)
-        ratios.append(found.full[:60].reshape(3, 20).mean(axis=1) / [4.0, 1.0, 0.25])
+        estimate = curve_variances(*_inputs(synthetic(1500, 2, truth, rng)))
+        assert set(estimate.gains) == {0}
+        assert not estimate.variance[60:].any()
+        assert estimate.noise == pytest.approx(1.0, abs=0.15)
+        ratios.append(estimate.full[:60].reshape(3, 20).mean(axis=1) / [4.0, 1.0, 0.25])
     assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.4)  # the rare ones are shrunk towards the rest
 
 
-def _given(made: Made) -> tuple[Array, float, Numbers, Numbers]:
-    A, F, z, joint, period = made
+def _inputs(result: Synthetic) -> tuple[Array, float, Numbers, Numbers]:
+    A, F, z, joint, period = result
     return moments_of(A, F, z), float(len(z)), joint, period
 
 
 def test_noise_alone_has_no_curve() -> None:
     rng = np.random.default_rng(5)
     for rows in (60, 300, 1000):
-        found = curve_variances(*_given(synthetic(rows, 3, np.zeros(3 * 120), rng)))
-        assert not found.variance.any()
-        assert found.gains == {}
-        assert found.noise == pytest.approx(1.0, abs=0.4)
+        estimate = curve_variances(*_inputs(synthetic(rows, 3, np.zeros(3 * 120), rng)))
+        assert not estimate.variance.any()
+        assert estimate.gains == {}
+        assert estimate.noise == pytest.approx(1.0, abs=0.4)
 
 
 def test_a_line_stands_out_and_what_is_beside_it_is_shrunk() -> None:
     truth = np.zeros(120)
     truth[2 * 16 : 2 * 17] = 4.0
-    found = curve_variances(*_given(synthetic(400, 1, truth, np.random.default_rng(6))))
-    assert found.full[32:34].mean() > 1.0
-    assert np.delete(found.full, [32, 33]).max() < 0.05
-    assert found.informed[32:34].min() > 0.9
+    estimate = curve_variances(*_inputs(synthetic(400, 1, truth, np.random.default_rng(6))))
+    assert estimate.full[32:34].mean() > 1.0
+    assert np.delete(estimate.full, [32, 33]).max() < 0.05
+    assert estimate.informed[32:34].min() > 0.9
 
 
 def test_units_and_the_order_of_the_joints_do_not_matter() -> None:
-    made = synthetic(300, 2, np.repeat([1.0, 0.2], 40), np.random.default_rng(7))
-    A, F, z, joint, period = made
-    plain = curve_variances(*_given(made))
+    result = synthetic(300, 2, np.repeat([1.0, 0.2], 40), np.random.default_rng(7))
+    A, F, z, joint, period = result
+    plain = curve_variances(*_inputs(result))
     swapped = np.r_[40:80, 0:40]
     other = curve_variances(moments_of(A, 1e3 * F[:, swapped], z), len(z), 1 - joint[swapped], period)
     assert_allclose(1e6 * other.variance, plain.variance[swapped], rtol=1e-4, atol=1e-12)
@@ -154,13 +154,13 @@ def test_units_and_the_order_of_the_joints_do_not_matter() -> None:
 
 def test_a_joint_that_readings_do_not_see_has_no_curve() -> None:
     A, F, z, joint, period = synthetic(400, 2, np.repeat([1.0, 4.0], 40), np.random.default_rng(8))
-    every = curve_variances(*_given((A, F, z, joint, period)), most=1000.0)
+    every = curve_variances(*_inputs((A, F, z, joint, period)), most=1000.0)
     assert set(every.gains) == {0, 1}
-    seen = curve_variances(*_given((A, F, z, joint, period)), most=80.0)  # the second has 160
+    seen = curve_variances(*_inputs((A, F, z, joint, period)), most=80.0)  # the second has 160
     assert set(seen.gains) == {0}
     assert not seen.full[joint == 1].any()
     small = np.where(joint == 1, 1e-4, 1.0)  # the noise seems to be a curve of 1e4 times the size
-    assert set(curve_variances(*_given((A, F * small, z, joint, period)), most=1000.0).gains) == {0}
+    assert set(curve_variances(*_inputs((A, F * small, z, joint, period)), most=1000.0).gains) == {0}
 
 
 # -- twins
@@ -205,9 +205,9 @@ def test_outside_the_measured_range_the_curve_is_uncertain() -> None:
     twin = geared()
     data = campaign(twin, 150, 21, spread=0.35)
     fit = identify(load_robot("irb120"), data, CURVED)
-    told = {notice.code: notice.message for notice in check_curves(fit, data)}
-    assert "axis_1 from -57 to 58 deg" in told["curve-range"]
-    assert "contains what that may be off by" in told["curve-range"]
+    messages = {notice.code: notice.message for notice in check_curves(fit, data)}
+    assert "axis_1 from -57 to 58 deg" in messages["curve-range"]
+    assert "contains what that may be off by" in messages["curve-range"]
     names = [name for name in curve_names(1) if name in fit.free.names]
     places = [fit.free.names.index(name) for name in names]
     angle = np.radians([-30.0, 0.0, 30.0, 120.0, 150.0, 180.0])
@@ -221,10 +221,10 @@ def test_outside_the_measured_range_the_curve_is_uncertain() -> None:
     kinematics = fit.robot.forward_kinematics(wide.postures, target)
     J = fit.robot.position_jacobian(kinematics, wide.postures, fit.free.names)
     spread = np.sqrt(np.einsum("pan,pq,qan->na", J, fit.covariance, J))
-    mine = wide.target == wide.targets.index(target)
-    off = np.abs(wide.position[mine] - kinematics.position.T[wide.configuration[mine]])
+    rows = wide.target == wide.targets.index(target)
+    off = np.abs(wide.position[rows] - kinematics.position.T[wide.configuration[rows]])
     # Not all of it: through a third of a turn a line may be taken for its neighbour, which goes another way outside.
-    assert ((off < 1.96 * np.hypot(spread, NOISE)[wide.configuration[mine]]).mean()) > 0.7
+    assert ((off < 1.96 * np.hypot(spread, NOISE)[wide.configuration[rows]]).mean()) > 0.7
 
 
 def test_the_expected_error_holds_where_a_joint_was_measured_through_a_sixth_of_its_turn() -> None:
@@ -260,8 +260,8 @@ def test_the_same_data_are_not_counted_twice(fitted: tuple[Twin, Dataset, Fit]) 
     curves = [name for name in once.free.names if name.startswith("curve_")]
     before, after = (np.array([fit.robot.values[name] for name in curves]) for fit in (once, twice))
     assert_allclose(after, before, atol=2e-7)
-    kept = identify(once.robot, data, GEOMETRIC)  # without the effect the curves stay
-    assert [kept.robot.values[name] for name in curves] == before.tolist()
+    result = identify(once.robot, data, GEOMETRIC)  # without the effect the curves stay
+    assert [result.robot.values[name] for name in curves] == before.tolist()
 
 
 def test_without_errors_of_gears_there_are_no_curves() -> None:
@@ -328,6 +328,6 @@ def test_a_measured_ur5_has_curves(measured_data: Path) -> None:
     assert mean_error(plain.robot, held_out) > 0.1e-3
     assert mean_error(curved.robot, held_out) < 0.055e-3
     assert mean_error(curved.robot, others) < 0.062e-3
-    told = {notice.code: notice.message for notice in check_curves(curved, training)}
-    assert "shoulder from -105 to" in told["curve-range"]
-    assert "wrist_3 (50 deg)" in told["curve-left-out"]
+    messages = {notice.code: notice.message for notice in check_curves(curved, training)}
+    assert "shoulder from -105 to" in messages["curve-range"]
+    assert "wrist_3 (50 deg)" in messages["curve-left-out"]

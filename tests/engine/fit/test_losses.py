@@ -49,9 +49,9 @@ def test_the_deviation_of_a_coordinate_is_found_from_readings_of_either_kind_and
 
 def test_the_further_off_the_less_it_counts() -> None:
     for loss in ROBUST:
-        found = weights(loss, np.array([0.1, 1.0, 3.0, 10.0, 100.0]), 1.0)
-        assert (np.diff(found) <= 0.0).all(), loss
-        assert found[-1] < 0.05 * found[0], loss
+        values = weights(loss, np.array([0.1, 1.0, 3.0, 10.0, 100.0]), 1.0)
+        assert (np.diff(values) <= 0.0).all(), loss
+        assert values[-1] < 0.05 * values[0], loss
 
 
 @cache

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from papers.katana.tilting import twin as tilting_twin
 from truearm.engine.base.errors import InputError
@@ -54,9 +54,9 @@ def place_of(robot: Robot, target: str) -> Array:
 def test_readings_of_the_nominal_robot_give_its_own_places_and_name_what_is_taken_on_trust(device: str) -> None:
     twin, data = read_by(device)
     start = start_from_readings(NOMINAL, data)
-    found, true = (np.array([place_of(robot, name) for name in data.targets]) for robot in (start, twin.robot))
+    values, true = (np.array([place_of(robot, name) for name in data.targets]) for robot in (start, twin.robot))
     # the search for a touching tip keeps to 1 m a little, and more where lines are nearly flat about their middles
-    np.testing.assert_allclose(found, true, atol=1e-4 if device == "drawn-circle" else 1e-6)
+    np.testing.assert_allclose(values, true, atol=1e-4 if device == "drawn-circle" else 1e-6)
     if data.anchored:
         np.testing.assert_allclose(start.base.translation, twin.robot.base.translation, atol=1e-9)
         np.testing.assert_allclose(start.base.rotation, twin.robot.base.rotation, atol=1e-9)
@@ -73,19 +73,19 @@ def test_the_world_of_a_closed_loop_is_the_base_wherever_that_is(device: str) ->
     """The same readings, the base elsewhere: the fixtures go with it, targets and what is identified do not."""
     _, data = read_by(device, "random", sigma=1e-5)
     moved = NOMINAL.with_frames(ASKEW, {})
-    here, there = (identify(robot, data, GEOMETRIC) for robot in (NOMINAL, moved))
-    assert there.robot.base.translation == ASKEW.translation
-    assert not any(name.startswith("base_") for name in there.free.names)
+    at_origin, at_moved = (identify(robot, data, GEOMETRIC) for robot in (NOMINAL, moved))
+    assert at_moved.robot.base.translation == ASKEW.translation
+    assert not any(name.startswith("base_") for name in at_moved.free.names)
     for name in data.fixtures:
-        if here.robot.fixture(name).kind != "plane":
-            before, after = (fit.robot.fixture_kinematics(name).position[:, 0] for fit in (here, there))
+        if at_origin.robot.fixture(name).kind != "plane":
+            before, after = (fit.robot.fixture_kinematics(name).position[:, 0] for fit in (at_origin, at_moved))
             np.testing.assert_allclose(ASKEW.rotation @ before + ASKEW.translation, after, atol=1e-8)
-    values = {n: v for n, v in here.robot.values.items() if not n.startswith(("base_", "fixture_"))}
-    assert {n: there.robot.values[n] for n in values} == pytest.approx(values, abs=1e-8)
+    values = {n: v for n, v in at_origin.robot.values.items() if not n.startswith(("base_", "fixture_"))}
+    assert {n: at_moved.robot.values[n] for n in values} == pytest.approx(values, abs=1e-8)
 
 
-def strings_of(data: Dataset, kept: tuple[int, ...]) -> Dataset:
-    return data.of_readings(np.isin(data.against, kept))
+def strings_of(data: Dataset, strings: tuple[int, ...]) -> Dataset:
+    return data.of_readings(np.isin(data.against, strings))
 
 
 def test_strings_from_one_plane_tell_on_which_side_the_robot_is() -> None:
@@ -114,31 +114,31 @@ def test_four_strings_that_are_not_in_a_plane() -> None:
     np.testing.assert_allclose(start.base.translation, twin.robot.base.translation, atol=1e-9)
 
 
-def joined(one: Dataset, other: Dataset) -> Dataset:
+def joined(first: Dataset, other: Dataset) -> Dataset:
     """Return the readings of two campaigns with one robot as one dataset without deviations."""
 
     def both(name: str, *width: int) -> Array | None:
-        parts = [getattr(d, name) for d in (one, other)]
+        parts = [getattr(d, name) for d in (first, other)]
         if parts[0] is None and parts[1] is None:
             return None
-        empty = [np.full((len(d.target), *width), np.nan) for d in (one, other)]
+        empty = [np.full((len(d.target), *width), np.nan) for d in (first, other)]
         return np.concatenate([e if p is None else p for p, e in zip(parts, empty, strict=True)])
 
-    n = one.configurations
-    against = [one.against, np.where(other.against < 0, -1, other.against + len(one.fixtures))]
+    n = first.configurations
+    against = [first.against, np.where(other.against < 0, -1, other.against + len(first.fixtures))]
     return Dataset(
         source="both",
         labels=tuple(map(str, range(n + other.configurations))),
-        joints=np.concatenate([one.joints, other.joints]),
-        joint_kinds=one.joint_kinds,
-        targets=(*one.targets, *other.targets),
-        configuration=np.concatenate([one.configuration, other.configuration + n]),
-        target=np.concatenate([one.target, other.target + len(one.targets)]),
-        position=np.concatenate([one.position, other.position]),
+        joints=np.concatenate([first.joints, other.joints]),
+        joint_kinds=first.joint_kinds,
+        targets=(*first.targets, *other.targets),
+        configuration=np.concatenate([first.configuration, other.configuration + n]),
+        target=np.concatenate([first.target, other.target + len(first.targets)]),
+        position=np.concatenate([first.position, other.position]),
         quaternion=both("quaternion", 4),
         distance=both("distance"),
         height=both("height"),
-        fixtures=(*one.fixtures, *other.fixtures),
+        fixtures=(*first.fixtures, *other.fixtures),
         fixture=np.concatenate(against),
         setup=other.setup,
     )
@@ -162,8 +162,8 @@ def test_two_devices_with_targets_of_their_own_stand_in_one_world() -> None:
             for name in names:
                 np.testing.assert_allclose(place_of(start, name), place_of(robot, name), atol=1e-6, err_msg=case)
         if one.anchored:
-            there = twin.robot.base.translation
-            np.testing.assert_allclose(start.base.translation, there, atol=1e-8, err_msg=case)
+            base = twin.robot.base.translation
+            np.testing.assert_allclose(start.base.translation, base, atol=1e-8, err_msg=case)
             assert "base_x" in unanchored(GEOMETRIC.free(start), data).names
 
 
@@ -173,8 +173,8 @@ def test_missing_readings_do_no_harm() -> None:
         lengths = getattr(data, field).copy()
         lengths[[3, 11]] = np.nan
         start = start_from_readings(NOMINAL, replace(data, **{field: lengths}))
-        found, true = (place_of(robot, data.targets[0]) for robot in (start, twin.robot))
-        np.testing.assert_allclose(found, true, atol=1e-6, err_msg=device)
+        result, true = (place_of(robot, data.targets[0]) for robot in (start, twin.robot))
+        np.testing.assert_allclose(result, true, atol=1e-6, err_msg=device)
 
 
 def test_a_target_that_two_strings_hold_is_found_around_one_that_four_do() -> None:
@@ -189,16 +189,16 @@ def test_a_target_that_two_strings_hold_is_found_around_one_that_four_do() -> No
 
 
 def test_the_known_place_of_a_frame_says_nothing_of_how_it_is_turned() -> None:
-    twin, one = read_by("tracker")
+    twin, dataset = read_by("tracker")
     _, other = read_by("five-lasers")
-    plain = start_from_readings(NOMINAL, joined(one, other))
+    plain = start_from_readings(NOMINAL, joined(dataset, other))
     fixture = plain.fixture("place_2")
     x, y, z = plain.fixture_kinematics("place_2").position[:, 0].tolist()
     known = recorded(
         NOMINAL, "known", np.zeros((1, 6)), [0], ["place_2"], position=np.array([[x + 1e-4, y, z]]),
         fixtures=other.fixtures, sigma=1e-5,
     )  # fmt: skip
-    start = start_from_readings(NOMINAL, replace(joined(one, other), setup=known))
+    start = start_from_readings(NOMINAL, replace(joined(dataset, other), setup=known))
     assert start.fixture("place_2").quaternion == pytest.approx(fixture.quaternion)
     assert start.values["fixture_place_2_x"] == x + 1e-4
     assert twin.robot.base.translation == pytest.approx(start.base.translation, abs=1e-9)
@@ -249,7 +249,7 @@ def test_a_closed_loop_names_what_joints_that_never_moved_leave_open(device: str
 def test_postures_that_are_all_alike_or_too_few_are_refused(device: str) -> None:
     _, data = read_by(device, count=12)
     alike = replace(data, joints=np.tile(data.joints[:1], (12, 1)))
-    with refused("too few or too much alike; got '12 postures that determine ", of=device):
+    with refusing("too few or too much alike; got '12 postures that determine ", of=device):
         start_from_readings(NOMINAL, alike)
     with pytest.raises(InputError, match=r"measured too few times|too few or too much alike"):
         start_from_readings(NOMINAL, data.of_configurations([0, 1]))
@@ -257,10 +257,10 @@ def test_postures_that_are_all_alike_or_too_few_are_refused(device: str) -> None
 
 def test_strings_and_fixtures_that_say_too_little_are_refused() -> None:
     _, data = read_by("strings")
-    with refused("no target was measured from enough known points", "three known fixtures"):
+    with refusing("no target was measured from enough known points", "three known fixtures"):
         start_from_readings(NOMINAL, strings_of(data, (0, 1)))
     _, data = read_by("ballbar")
-    with refused("ballbar, fixture cup_2: a fixture was measured too few times", "0 readings"):
+    with refusing("ballbar, fixture cup_2: a fixture was measured too few times", "0 readings"):
         start_from_readings(NOMINAL, data.of_readings(data.against != 1))
     few = data.against.copy()
     few[0] = len(data.fixtures)
@@ -279,14 +279,14 @@ def test_planes_that_are_points_too_or_whose_place_is_known_are_refused() -> Non
     assert data.height is not None
     height, distance = data.height.copy(), np.full(len(data.height), np.nan)
     distance[::2], height[::2] = 0.3, np.nan
-    with refused("fixture plate_level: the readings disagree", "got 'plane and point'"):
+    with refusing("fixture plate_level: the readings disagree", "got 'plane and point'"):
         start_from_readings(NOMINAL, replace(data, height=height, distance=distance))
     position = np.array([[0.3, 0.0, 0.1]])
     place = recorded(NOMINAL, "known", np.zeros((1, 6)), [0], ["plate_level"], position=position, sigma=1e-5)
     away = replace(place, targets=("peg",), fixtures=("plate_level",), fixture=np.array([0]))
     away = replace(away, position=np.full((1, 3), np.nan), distance=np.array([0.2]))
     for known in (place, away):
-        with refused("fixture plate_level: a plane has no place and no distance"):
+        with refusing("fixture plate_level: a plane has no place and no distance"):
             start_from_readings(NOMINAL, replace(data, setup=known))
 
 

@@ -37,11 +37,11 @@ def test_gears_that_err_are_found() -> None:
     gears = {2: (242, 6e-5), 3: (200, 1e-4), 5: (102, 2e-4)}
     for seed in range(3):
         fit, data = campaign(unknown_gears(load_robot("irb120")), gears, 150, seed)
-        found = {error.joint: (error.periods, error.amplitude) for error in periodic_errors(fit, data)}
-        assert set(found) == set(gears), seed
+        errors = {error.joint: (error.periods, error.amplitude) for error in periodic_errors(fit, data)}
+        assert set(errors) == set(gears), seed
         for joint, (periods, size) in gears.items():
-            assert found[joint][0] == pytest.approx(periods, abs=1)
-            assert found[joint][1] == pytest.approx(size, rel=0.25)
+            assert errors[joint][0] == pytest.approx(periods, abs=1)
+            assert errors[joint][1] == pytest.approx(size, rel=0.25)
         (notice,) = check_transmission(fit, data)
         assert notice.code == "transmission-error"
         assert "joint 3 200 times" in notice.message

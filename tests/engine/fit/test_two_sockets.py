@@ -63,9 +63,9 @@ def campaign(seed: int, sigma: float, newton: float = 5.0, count: int = 120) -> 
 def error(robot: Robot, twin: Twin) -> float:
     """Return the mean error of the ball all over the limits of the joints, behind the best rigid motion [m]."""
     q = NOMINAL.random_configurations(100, np.random.default_rng(99))
-    true, found = twin.frames(q)["ball"][:, :3, 3], robot.world_poses(q, "ball")[0]
-    R, t = rigid_motion(found, true)
-    return float(np.linalg.norm(found @ R.T + t - true, axis=1).mean())
+    true, result = twin.frames(q)["ball"][:, :3, 3], robot.world_poses(q, "ball")[0]
+    R, t = rigid_motion(result, true)
+    return float(np.linalg.norm(result @ R.T + t - true, axis=1).mean())
 
 
 @pytest.mark.parametrize(("seed", "sigma", "most"), [(0, 2e-5, 0.1), (1, 1e-4, 0.25)])
@@ -103,5 +103,5 @@ def test_the_distance_of_the_sockets_is_the_only_scale() -> None:
 def test_a_size_that_no_reading_holds_does_not_explain_what_a_fit_leaves() -> None:
     _, data = campaign(3, 2e-5, 0.0, 60)
     left = LeftOver.of(identify(NOMINAL, data, named_model("geometric")), data)
-    rest = left.without_parameters(left.residual)
-    assert float(rest @ rest) > 0.5 * float(left.residual @ left.residual)
+    remaining = left.without_parameters(left.residual)
+    assert float(remaining @ remaining) > 0.5 * float(left.residual @ left.residual)

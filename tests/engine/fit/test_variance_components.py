@@ -61,10 +61,10 @@ def mean_squares(readings: Array) -> tuple[float, float]:
 def test_equal_visits_give_the_estimates_of_the_analysis_of_variance() -> None:
     readings = one_way(1.5)
     between, within = mean_squares(readings)
-    found = components(readings)
-    assert found.holds
-    assert found.weighing.factors[0] == pytest.approx(within, rel=1e-3)
-    assert found.weighing.joints[0] == pytest.approx((between - within) / READINGS, rel=1e-3)
+    result = components(readings)
+    assert result.holds
+    assert result.weighing.factors[0] == pytest.approx(within, rel=1e-3)
+    assert result.weighing.joints[0] == pytest.approx((between - within) / READINGS, rel=1e-3)
 
 
 def test_the_mean_of_visits_is_as_uncertain_as_student_says() -> None:
@@ -76,9 +76,9 @@ def test_the_mean_of_visits_is_as_uncertain_as_student_says() -> None:
 
 def test_visits_that_share_nothing_have_no_error_of_the_joints() -> None:
     readings = one_way(0.0, 1)
-    found = components(readings)
-    assert found.likeliest.joints[0] == 0.0
-    assert found.weighing.factors[0] == pytest.approx(np.var(readings, ddof=1), rel=1e-3)
+    result = components(readings)
+    assert result.likeliest.joints[0] == 0.0
+    assert result.weighing.factors[0] == pytest.approx(np.var(readings, ddof=1), rel=1e-3)
 
 
 def test_priors_are_integrated_out() -> None:
@@ -90,7 +90,7 @@ def test_priors_are_integrated_out() -> None:
     z += np.where(np.arange(90) < 50, 1.0, 2.0) * rng.standard_normal(90)
     factor = (np.arange(90) >= 50).astype(np.intp)
     at = Linearised(-z, A, G, np.zeros(6), True, Visits(of_row), factor)
-    found = variance_components(at, [True, True], np.full(2, 1e-9), [np.array([0, 1]), np.array([2])])
+    estimate = variance_components(at, [True, True], np.full(2, 1e-9), [np.array([0, 1]), np.array([2])])
 
     def likelihood(values: Array) -> float:
         V = np.diag(values[factor]) + A @ A.T
@@ -98,7 +98,7 @@ def test_priors_are_integrated_out() -> None:
         V += same * ((G * np.array([values[2], values[2], values[3]])) @ G.T)
         return -0.5 * float(np.linalg.slogdet(V)[1] + z @ np.linalg.solve(V, z))
 
-    best = np.array([*found.likeliest.factors, found.likeliest.joints[0], found.likeliest.joints[2]])
+    best = np.array([*estimate.likeliest.factors, estimate.likeliest.joints[0], estimate.likeliest.joints[2]])
     assert np.all(best > 0.0)
     for place in range(4):
         for step in (0.93, 1.07):
@@ -109,11 +109,11 @@ def test_priors_are_integrated_out() -> None:
     of_joints = (of_row[:, None] == of_row[None, :]) * ((G[:, :2] * best[2]) @ G[:, :2].T)
     V += of_joints + (of_row[:, None] == of_row[None, :]) * (best[3] * np.outer(G[:, 2], G[:, 2]))
     C = np.linalg.inv(A.T @ np.linalg.solve(V, A) + np.eye(6))
-    np.testing.assert_allclose(sum(part.covariance for part in found.parts), C, rtol=1e-6)
-    part = next(part for part in found.parts if part.joints == (0, 1))
+    np.testing.assert_allclose(sum(part.covariance for part in estimate.parts), C, rtol=1e-6)
+    part = next(part for part in estimate.parts if part.joints == (0, 1))
     pulled = np.linalg.solve(V, A @ C)
     np.testing.assert_allclose(part.covariance, pulled.T @ of_joints @ pulled, rtol=1e-6, atol=1e-9)
-    assert part.freedom == found.likeliest.freedom[0] < 2 * len(set(of_row.tolist()))
+    assert part.freedom == estimate.likeliest.freedom[0] < 2 * len(set(of_row.tolist()))
 
 
 def test_the_likelihood_is_right_where_joints_err_by_far_more_than_readings() -> None:
@@ -181,34 +181,34 @@ def readings(configurations: int = 24) -> Dataset:
     return replace(read, joints=q, sigma=None)
 
 
-def same_fit(one: Fit, other: Fit) -> None:
-    assert one.status == other.status
-    assert_allclose([*other.robot.values.values()], [*one.robot.values.values()], rtol=1e-9, atol=1e-12)
-    size = np.sqrt(np.diag(one.covariance))
-    assert_allclose(other.covariance, one.covariance, rtol=0.0, atol=1e-9 * np.outer(size, size).max())
-    assert_allclose(other.joint_error, one.joint_error, rtol=1e-9)
-    assert other.sigma == pytest.approx(one.sigma, rel=1e-9)
+def same_fit(first: Fit, other: Fit) -> None:
+    assert first.status == other.status
+    assert_allclose([*other.robot.values.values()], [*first.robot.values.values()], rtol=1e-9, atol=1e-12)
+    size = np.sqrt(np.diag(first.covariance))
+    assert_allclose(other.covariance, first.covariance, rtol=0.0, atol=1e-9 * np.outer(size, size).max())
+    assert_allclose(other.joint_error, first.joint_error, rtol=1e-9)
+    assert other.sigma == pytest.approx(first.sigma, rel=1e-9)
 
 
 def test_a_fit_in_portions_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     data = readings()
     whole = {name: identify(IRB120, data, MODEL[name]) for name in ("geometric", "elastic")}
     monkeypatch.setattr(problem, "_AT_ONCE", 3000)
-    for kept in (True, False):
-        if not kept:
-            monkeypatch.setattr(likelihood, "_KEPT", 0)
+    for stored in (True, False):
+        if not stored:
+            monkeypatch.setattr(likelihood, "_MOST_STORED", 0)
             monkeypatch.setattr(likelihood, "_AT_ONCE", 1000)
-        for name, one in whole.items():
-            assert one.joint_error.any()
-            same_fit(one, identify(IRB120, data, MODEL[name]))
+        for name, value in whole.items():
+            assert value.joint_error.any()
+            same_fit(value, identify(IRB120, data, MODEL[name]))
 
 
 def test_what_is_known_of_fixtures_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
     data = two_sockets(2, 2e-5, 0.0, 60)[1]
     assert data.setup is not None
-    one = identify(NOMINAL, data, MODEL["geometric"])
+    other_fit = identify(NOMINAL, data, MODEL["geometric"])
     monkeypatch.setattr(problem, "_AT_ONCE", 2000)
-    same_fit(one, identify(NOMINAL, data, MODEL["geometric"]))
+    same_fit(other_fit, identify(NOMINAL, data, MODEL["geometric"]))
 
 
 def test_portions_hold_every_equation_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,8 +217,8 @@ def test_portions_hold_every_equation_once(monkeypatch: pytest.MonkeyPatch) -> N
     robot = truth_twin(IRB120, "tracker-triangular", np.random.default_rng(5)).robot
     noise = {"position": 1e-4}
     whole = Problem(robot, drawn, MODEL["geometric"].free(robot), noise)
-    here = whole.at(whole.free.start)
-    r, J, G = here.residual, here.jacobian, here.by_joints
+    evaluation = whole.at(whole.free.start)
+    r, J, G = evaluation.residual, evaluation.jacobian, evaluation.by_joints
     monkeypatch.setattr(problem, "_AT_ONCE", 2000)
     parted = replace(whole).at(whole.free.start)
     parts = [*parted.portions()]

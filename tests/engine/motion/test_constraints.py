@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.motion.cell import segment_distance, smallest_clearance
 from truearm.engine.motion.constraints import Constraints, allowed, read_constraints, refuse_clearance_of
@@ -125,7 +125,7 @@ joints:
         (file, 60, ["no two links between which a clearance could be kept"]),
     ):
         rules = Constraints.model_validate(HEAD | {"clearance": clearance})
-        with refused("rules.yaml, clearance", *words, of=clearance):
+        with refusing("rules.yaml, clearance", *words, of=clearance):
             refuse_clearance_of(load_robot(name), rules, "rules.yaml")
 
 
@@ -150,14 +150,14 @@ def test_what_does_not_fit_the_robot_is_refused(arm: Robot, postures: Postures) 
         ({"box": {"of": "flange", "x": [1, 0]}}, ["the range is empty"]),
         ({"visibility": {"within": 30, "targets": {"4": [0, 0, 1]}}}, ["no target of this name"]),
     ):
-        with refused(*words, of=entries):
+        with refusing(*words, of=entries):
             kept(arm, postures, **entries)
-    with refused("no masses"):
+    with refusing("no masses"):
         kept(load_robot("kr5"), postures, moments={2: "positive"})
-    with refused("the box is for targets, and the robot has none"):
+    with refusing("the box is for targets, and the robot has none"):
         kept(arm.with_frames(arm.base, {}), postures, box={"of": "targets"})
     rules = Constraints.model_validate(HEAD | {"visibility": {"within": 30, "targets": {"1": [0, 0, 1]}}})
-    with refused("the position of the instrument is not known"):
+    with refusing("the position of the instrument is not known"):
         allowed(arm, postures, rules, "rules.yaml", seen_from_the_origin=False)
 
 
@@ -175,5 +175,5 @@ def test_entries_that_are_not_known_are_refused(tmp_path: Path) -> None:
         ('keep_out: {"a\\nMoveAbsJ": {x: [0, 1]}}', ["keep_out", "without control characters"]),
     ):
         file.write_text(f"truearm: truearm-constraints/1\nunits: {{length: mm, angle: deg}}\n{text}\n")
-        with refused(*words, of=text):
+        with refusing(*words, of=text):
             read_constraints(file)

@@ -8,7 +8,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 from tests.pinocchio_oracle import PinocchioChain
 
 from truearm.engine.motion.cube import PLANES, Cube
@@ -125,7 +125,7 @@ def test_refusals() -> None:
         ("reaches no cube in this", lambda: largest_cube(ball(0.5), floor=2.0)),
     ]
     for words, make in wrong:
-        with refused(words, of=words):
+        with refusing(words, of=words):
             make()
 
 
@@ -212,9 +212,9 @@ def test_poses_that_cannot_be_are_refused() -> None:
         ("a move must not be negative", {"least_move": np.nan}),
         ("no target of this name", {"target": "gripper"}),
     ):
-        with refused(words, of=options):
+        with refusing(words, of=options):
             plan_poses(robot, cube, **options)
-    with refused("does not reach all points", "of 16 points out of reach, such as ["):
+    with refusing("does not reach all points", "of 16 points out of reach, such as ["):
         plan_poses(robot, Cube((0.6, 0.0, 0.4), 0.3), count=16)
-    with refused("no order of the poses was found", "too small for 60 deg"):
+    with refusing("no order of the poses was found", "too small for 60 deg"):
         plan_poses(load_robot("li3"), ARMS["li3"], count=30, least_move=np.radians(60))

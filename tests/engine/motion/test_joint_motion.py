@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 from tests.pinocchio_oracle import PinocchioChain
 
 from truearm.engine.base.errors import InputError
@@ -172,7 +172,7 @@ NORMAL = np.array([[1, 0, 0], [0, -np.sqrt(0.5), np.sqrt(0.5)], [0, -np.sqrt(0.5
 def test_the_katana_cannot_hold_its_tool_across_the_circle() -> None:
     path = line((0.0, -0.3707107, 0.21), (0.0, -0.36, 0.2))
     for turned in (NORMAL, NORMAL @ np.diag([1.0, -1.0, -1.0])):
-        with refused("0.0 mm along the path, at 0 s (sample 0): the motion cannot start", "free"):
+        with refusing("0.0 mm along the path, at 0 s (sample 0): the motion cannot start", "free"):
             joint_motion(katana(), path, target="tip", orientation="axis", rotation=turned)
     assert len(joint_motion(katana(), path, target="tip").time) == len(path.time)
 
@@ -183,7 +183,7 @@ def test_a_path_that_leaves_the_reach_says_where() -> None:
         joint_motion(load_robot("li3"), path)
     assert refusal.value.cure == "Move the path towards the arm, or start elsewhere (`seed_joints`)."
     assert 0.4 < np.linalg.norm([0.3 + travelled(refusal.value), 0.1, 0.3]) < 1.2
-    with refused("cannot start", "are missing"):
+    with refusing("cannot start", "are missing"):
         joint_motion(load_robot("li3"), line((1.2, 0.1, 0.3), (0.3, 0.1, 0.3)))
 
 
@@ -216,13 +216,13 @@ def test_a_path_through_a_singular_wrist_is_refused_there_though_no_sample_is_in
         assert travelled(refusal.value) == pytest.approx(0.03, abs=0.01)
         assert "free more of the orientation" in str(refusal.value)
     up = np.array([0, 0, 0.05])
-    with refused("singular posture"):
+    with refusing("singular posture"):
         joint_motion(robot, line(middle + up, middle - up, step=0.07), orientation="full", rotation=R)
 
 
 def test_steps_too_long_are_refused() -> None:
     path = line((0.3, -0.3, 0.3), (0.3, 0.3, 0.3), step=1.0)
-    with refused("have to jump; got 'axis_3 by ", "shorter steps"):
+    with refusing("have to jump; got 'axis_3 by ", "shorter steps"):
         joint_motion(load_robot("irb120"), path)
 
 
@@ -244,5 +244,5 @@ def test_refusals() -> None:
         ("wrong shape", lambda: joint_motion(katana(), changed(), seed=[0.0, 1.0])),
     ]
     for words, make in wrong:
-        with refused(words, of=words):
+        with refusing(words, of=words):
             make()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 from tests.house.examples import PATH
 
 from truearm.engine.motion.path_file import PlannedPath, read_path
@@ -152,7 +152,7 @@ def test_refusals() -> None:
         ("too many samples", lambda: timed(PATHS[0], 1, 1, 1e-9)),
     ]
     for words, make in wrong:
-        with refused(words, of=words):
+        with refusing(words, of=words):
             make()
 
 
@@ -244,7 +244,7 @@ def test_what_a_section_cannot_be_is_refused_with_its_number(tmp_path: Path) -> 
         ("  - {arc: [300, 50, 300]}\n", "arc"),
         ("  []\n", "sections"),
     ):
-        with refused("path.yaml", said, of=sections):
+        with refusing("path.yaml", said, of=sections):
             read(tmp_path, sections)
 
 
@@ -263,7 +263,7 @@ def test_what_a_file_cannot_be_is_refused(tmp_path: Path) -> None:
         ("speed: 100", "speed: 100\njoint_speeds: [10, 0]", "joint_speeds"),
     ):
         assert old in HEAD
-        with refused("path.yaml", said, of=new):
+        with refusing("path.yaml", said, of=new):
             read(tmp_path, "  - line: [300, 100, 300]\n", HEAD.replace(old, new, 1))
 
 

@@ -103,7 +103,7 @@ def test_a_comment_is_a_few_lines_and_changes_nothing_that_is_read(language: Lan
             }
             left = [re.sub(r"(LINE_COUNT\s*= )\d+", r"\g<1>", row) for row in rows[:first] + rows[first + len(lines) :]]
             assert left == [re.sub(r"(LINE_COUNT\s*= )\d+", r"\g<1>", row) for row in old_rows]
-            assert language.is_one(one.text)
+            assert language.recognizes(one.text)
         before, after = language.read(sources), language.read(new)
         assert [replace(t, line=0, places=()) for t in after.targets] == [
             replace(t, line=0, places=()) for t in before.targets
@@ -274,7 +274,7 @@ def test_nothing_that_is_read_makes_it_fall(language: Language, data: st.DataObj
             assert np.isfinite(value)
             assert span is None or float(whole[span[0] : span[1]] or "0") == value
     poses_of(program)
-    language.is_one(broken)
+    language.recognizes(broken)
     same = {i: np.array(target.values) for i, target in enumerate(program.targets)}
     assert edits_of(program, same) == []
     # No two targets have the same number, and what stands between numbers stays.
@@ -289,7 +289,7 @@ def test_nothing_that_is_read_makes_it_fall(language: Language, data: st.DataObj
 @given(raw=st.binary(max_size=400))
 def test_any_bytes_are_read_or_refused(language: Language, raw: bytes) -> None:
     text = raw.decode("latin-1")
-    language.is_one(text)
+    language.recognizes(text)
     program = read_or_refused(language, [Source(Path(f"any{language.suffixes[0]}"), text)])
     assert program is None or program.sources[0].text == text
 
@@ -308,8 +308,8 @@ def read_or_refused(language: Language, sources: Sequence[Source]) -> Program | 
 def test_languages_are_told_apart(language: Language) -> None:
     for sources in samples(language):
         for source in sources:
-            assert language.is_one(source.text), source.path
-            others = [one.name for one in LANGUAGES if one is not language and one.is_one(source.text)]
+            assert language.recognizes(source.text), source.path
+            others = [one.name for one in LANGUAGES if one is not language and one.recognizes(source.text)]
             assert not others, source.path
 
 
@@ -329,7 +329,7 @@ def test_a_text_is_of_one_language_or_of_none() -> None:
         ("def prog():\n  movej([0,0,0,0,0,0])\nend\n", ["URScript"]),
         ("/JOB\n//NAME MAIN\nNOP\nMOVJ C00000 VJ=50.00\nEND\n", ["INFORM"]),
     ):
-        assert [language.name for language in LANGUAGES if language.is_one(text)] == names, text
+        assert [language.name for language in LANGUAGES if language.recognizes(text)] == names, text
 
 
 @languages
@@ -337,7 +337,7 @@ def test_line_ends_and_a_byte_order_mark_do_not_matter(language: Language) -> No
     for sources in samples(language):
         read = [language.read(with_ends(sources, end)) for end in LINE_ENDS]
         read.append(language.read(with_ends(sources, "\n", BYTE_ORDER_MARK)))
-        assert all(language.is_one(source.text) for program in read for source in program.sources)
+        assert all(language.recognizes(source.text) for program in read for source in program.sources)
         one, *others = [
             (
                 [replace(target, places=()) for target in program.targets],

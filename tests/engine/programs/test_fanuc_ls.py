@@ -110,7 +110,7 @@ def test_a_file_with_motion_groups_carried_instructions_and_weaving() -> None:
 
 def test_a_file_of_a_post_processor_with_a_byte_order_mark_and_carriage_returns() -> None:
     found = sample(FANUC_LS, "wipe.ls")
-    assert FANUC_LS.is_one(found.sources[0].text)
+    assert FANUC_LS.recognizes(found.sources[0].text)
     assert [(t.line, t.name, t.frame, t.tool, t.values[1]) for t in found.targets] == [
         (8, "P[1]", "", "1", 0.0),
         (14, "P[2]", "", "1", 100.0),

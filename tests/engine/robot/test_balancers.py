@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_frame, random_robot
+from tests.expecting import refusing
 
 import truearm
 from truearm.engine.robot.balancers import Anchor, Balancer
@@ -190,10 +190,10 @@ def test_conversions_move_anchors_along(tmp_path: Path) -> None:
     robot = robot.with_values({"compliance_2": 1e-6, "balancer_1": 0.9, "d_2": 0.01, "d_3": 0.02})
     q = robot.random_configurations(5, np.random.default_rng(4))
     for name in CONVERSIONS:
-        made = converted(robot, name)
-        assert made.values["balancer_1"] == 0.9
-        for actual, expected in zip(made.world_poses(q), robot.world_poses(q), strict=True):
-            assert not made.masses or np.abs(actual - expected).max() < 1e-10, name
+        converted_robot = converted(robot, name)
+        assert converted_robot.values["balancer_1"] == 0.9
+        for actual, expected in zip(converted_robot.world_poses(q), robot.world_poses(q), strict=True):
+            assert not converted_robot.masses or np.abs(actual - expected).max() < 1e-10, name
 
 
 def test_exports_carry_balancers(tmp_path: Path) -> None:
@@ -206,10 +206,10 @@ def test_exports_carry_balancers(tmp_path: Path) -> None:
     assert_allclose(position, robot.world_poses(q)[0], rtol=0, atol=1e-10)
     assert_allclose(rotation, robot.world_poses(q)[1], rtol=0, atol=1e-10)
     assert "(1, (" in path.read_text()
-    assert any("cannot hold balancers; left out: spring" in said for said in exported(robot, "urdf").left_out)
-    assert not any("balancers" in said for said in exported(robot, "python").left_out)
-    (held,) = json.loads(exported(robot, "json").text)["balancers"]
-    assert (held["name"], held["fixed"]["link"], held["stiffness"]) == ("spring", 1, 40e3)
+    assert any("cannot hold balancers; left out: spring" in words for words in exported(robot, "urdf").left_out)
+    assert not any("balancers" in words for words in exported(robot, "python").left_out)
+    (entry,) = json.loads(exported(robot, "json").text)["balancers"]
+    assert (entry["name"], entry["fixed"]["link"], entry["stiffness"]) == ("spring", 1, 40e3)
 
 
 @pytest.mark.parametrize(
@@ -234,13 +234,13 @@ def test_exports_carry_balancers(tmp_path: Path) -> None:
     ],
 )
 def test_balancer_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, parts: list[str]) -> None:
-    with refused("balancers[1]", *parts):
+    with refusing("balancers[1]", *parts):
         arm(tmp_path, ARM.replace("PULL", PULL).replace(old, new, 1))
 
 
 def test_two_balancers_of_one_name_are_refused(tmp_path: Path) -> None:
     text = ARM.replace("PULL", PULL)
-    with refused("balancers[2]", "same name; got 'spring'", "balancers[1] has it too"):
+    with refusing("balancers[2]", "same name; got 'spring'", "balancers[1] has it too"):
         arm(tmp_path, text + text.splitlines(keepends=True)[-1])
     assert len(arm(tmp_path, text + text.splitlines()[-1].replace("name: spring, ", "")).balancers) == 2
 
@@ -315,7 +315,7 @@ def tilting(robot_id: str) -> Robot:
 
 
 def test_shifting_one_slide_against_a_parallel_one_leaves_moments_and_tip() -> None:
-    for robot_id, one, other, sign in (
+    for robot_id, first, other, sign in (
         ("katana450", "d_2", "d_3", 1.0),
         ("katana450", "d_3", "d_4", 1.0),
         ("irb120", "d_2", "d_3", 1.0),
@@ -323,8 +323,8 @@ def test_shifting_one_slide_against_a_parallel_one_leaves_moments_and_tip() -> N
         ("kr5", "y_2", "z_3", -1.0),
     ):
         robot = tilting(robot_id)
-        v, case = robot.values, f"{robot_id}: {one} and {other}"
-        shifted = robot.with_values({one: v[one] + 0.02, other: v[other] - sign * 0.02})
+        v, case = robot.values, f"{robot_id}: {first} and {other}"
+        shifted = robot.with_values({first: v[first] + 0.02, other: v[other] - sign * 0.02})
         q = robot.random_configurations(50, np.random.default_rng(1))
         assert_allclose(shifted.loaded(q).joint_loads, robot.loaded(q).joint_loads, rtol=0, atol=1e-10, err_msg=case)
         tip, before = (r.world_poses(q, "tip")[0] for r in (shifted, robot))
@@ -360,8 +360,8 @@ def test_derivatives_by_exchangeable_slides_are_exact() -> None:
         robot = robot.with_values({n: v + 0.01 for n, v in robot.values.items() if n in ("d_2", "d_3", "y_2", "z_3")})
         at = robot.loaded(robot.random_configurations(10, np.random.default_rng(4)))
         names = [n for n, p in robot.parameters.items() if p.group == "geometry"]
-        found = robot.position_jacobian(robot.forward_kinematics(at, "tip"), at, names)
-        for row, name in zip(found, names, strict=True):
+        result = robot.position_jacobian(robot.forward_kinematics(at, "tip"), at, names)
+        for row, name in zip(result, names, strict=True):
             ahead, back = (
                 robot.forward_kinematics(at, "tip", {**robot.values, name: robot.values[name] + step}).position
                 for step in (1e-5, -1e-5)
@@ -411,5 +411,5 @@ joints:
 def test_bearing_that_cannot_be_is_refused(tmp_path: Path, bearing: str, sliding: str, parts: list[str]) -> None:
     path = tmp_path / "robot.yaml"
     path.write_text(SLIDER.replace("BEARING", bearing).replace("SLIDING", sliding))
-    with refused(*parts):
+    with refusing(*parts):
         read_robot(path)

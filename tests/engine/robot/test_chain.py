@@ -202,8 +202,8 @@ def check_trials(robot: Robot, names: list[str], rng: np.random.Generator) -> No
         alone = robot.forward_kinematics(q, "tip", own)
         jacobians = robot.jacobians(alone, q, list(robot.parameters), own)
         ours = together.position[:, k], together.matrix()[k], linear[:, :, k], angular[:, :, k]
-        for one, other in zip(ours, (alone.position, alone.matrix(), *jacobians), strict=True):
-            assert_allclose(one, other, rtol=0, atol=1e-14, err_msg=f"{names}, trial {k}")
+        for first, other in zip(ours, (alone.position, alone.matrix(), *jacobians), strict=True):
+            assert_allclose(first, other, rtol=0, atol=1e-14, err_msg=f"{names}, trial {k}")
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)

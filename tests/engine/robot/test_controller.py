@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import AS_THE_MODEL, Controller
@@ -39,9 +39,9 @@ controller:
 
 
 def matrix(R: Array, p: Sequence[float] | Array) -> Array:
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = R, p
-    return made
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = R, p
+    return result
 
 
 def controller_poses(robot: Robot, readings: Array) -> Array:
@@ -113,7 +113,7 @@ def test_unknown_pulses_are_refused() -> None:
     for pulses, missing in (((), "joint 1, 2, 3"), ((1.0, None, 2.0), "joint 2"), ((None, 1.0, None), "joint 1, 3")):
         controller = Controller(pulses=pulses)
         for convert in (controller.to_pulses, controller.from_pulses):
-            with refused(f"{missing}: the number of motor pulses", of=pulses):
+            with refusing(f"{missing}: the number of motor pulses", of=pulses):
                 convert(np.zeros((2, 3)))
 
 
@@ -151,7 +151,7 @@ def test_unknown_pulses_are_refused() -> None:
     ],
 )
 def test_refused(entry: str, parts: list[str], tmp_path: Path) -> None:
-    with refused("robot.yaml", *parts):
+    with refusing("robot.yaml", *parts):
         read(tmp_path, f"  {entry}\n" if entry.startswith(("base", "flange", "tool")) else f"  joints: [{entry}]\n")
 
 
@@ -188,10 +188,10 @@ def test_round_trip(tmp_path: Path) -> None:
         (tmp_path / "again.yaml").write_text(text)
         again = read_robot(tmp_path / "again.yaml")
         assert robot_text(again) == text
-        one, other = robot.controller, again.controller
-        assert (one.source, one.signs, one.couplings) == (other.source, other.signs, other.couplings)
-        assert (one.base.quaternion, one.flange, one.pulses[0]) == (other.base.quaternion, other.flange, None)
-        ours, theirs = ([*c.zeros, *c.base.translation, *(p or 0.0 for p in c.pulses)] for c in (one, other))
+        first, other = robot.controller, again.controller
+        assert (first.source, first.signs, first.couplings) == (other.source, other.signs, other.couplings)
+        assert (first.base.quaternion, first.flange, first.pulses[0]) == (other.base.quaternion, other.flange, None)
+        ours, theirs = ([*c.zeros, *c.base.translation, *(p or 0.0 for p in c.pulses)] for c in (first, other))
         assert_allclose(ours, theirs, rtol=1e-15, atol=0, err_msg=f"{length}, {angle}")
 
 
@@ -238,9 +238,11 @@ def test_conversion_leaves_the_controllers_poses() -> None:
         readings = np.random.default_rng(3).uniform(-1, 1, (5, count))
         poses = controller_poses(robot, readings)
         for name in CONVERSIONS:
-            made = converted(robot, name)
-            assert_allclose(controller_poses(made, readings), poses, rtol=0, atol=1e-12, err_msg=f"{robot_id}, {name}")
-            assert replace(made.controller, base=turned) == controller
+            converted_robot = converted(robot, name)
+            assert_allclose(
+                controller_poses(converted_robot, readings), poses, rtol=0, atol=1e-12, err_msg=f"{robot_id}, {name}"
+            )
+            assert replace(converted_robot.controller, base=turned) == controller
 
 
 # -- the library -------------------------------------------------------------------------------------------

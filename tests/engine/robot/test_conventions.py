@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_robot, random_unit
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.conventions import CONVENTIONS, convention
@@ -121,17 +121,17 @@ def test_zero_reference_holds_its_axes_by_any_of_their_points() -> None:
     axes = [np.array(random_unit(rng, 3)) for _ in BOTH]
     points = [rng.uniform(-1, 1, 3) for _ in BOTH]
     q = rng.uniform(-1, 1, (5, 2))
-    found = []
+    poses = []
     for along in (0.0, 0.7):
         rows = [
             dict(zip(("axis_x", "axis_y", "axis_z", "x", "y", "z"), map(float, (*u, *(p + along * u))), strict=True))
             for u, p in zip(axes, points, strict=True)
         ]
         robot = robot_of("zero-reference", rows, BOTH)
-        found.append(robot.world_poses(q))
+        poses.append(robot.world_poses(q))
         assert_allclose(robot.world_poses(np.zeros((1, 2)))[0], 0.0, rtol=0, atol=1e-15)
-    for one, other in zip(*found, strict=True):
-        assert_allclose(one, other, rtol=0, atol=1e-14)
+    for first, other in zip(*poses, strict=True):
+        assert_allclose(first, other, rtol=0, atol=1e-14)
 
 
 # -- CPC's direction vectors -----------------------------------------------------------------------------
@@ -157,8 +157,8 @@ def test_small_rotations_and_published_direction_are_inverse() -> None:
 def test_robot_of_any_convention_round_trips(tmp_path: Path) -> None:
     for table in CONVENTIONS:
         rng = np.random.default_rng(0)
-        made = random_robot(table, ("gain",), rng)
-        robot = replace(made, joints=tuple(replace(joint, limits=(-0.25, 0.5)) for joint in made.joints))
+        result = random_robot(table, ("gain",), rng)
+        robot = replace(result, joints=tuple(replace(joint, limits=(-0.25, 0.5)) for joint in result.joints))
         (tmp_path / "robot.yaml").write_text(robot_text(robot), encoding="utf-8")
         again = read_robot(tmp_path / "robot.yaml")
         assert robot_text(again) == robot_text(robot)
@@ -192,7 +192,7 @@ EXPONENTIALS = "product-of-exponentials"
 def test_rows_that_describe_no_joint_are_refused(tmp_path: Path, name: str, entries: str, parts: list[str]) -> None:
     path = tmp_path / "robot.yaml"
     path.write_text(f"{HEAD}convention: {name}\njoints:\n  - {{{entries}}}\n", encoding="utf-8")
-    with refused("robot.yaml, joints[1]", *parts):
+    with refusing("robot.yaml, joints[1]", *parts):
         read_robot(path)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_frame, random_robot
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array, Chain
 from truearm.engine.robot.conventions import CONVENTIONS
@@ -28,22 +28,22 @@ def drawn(robot: Robot, rng: np.random.Generator) -> Robot:
     return robot.with_values({n: p.value + min(p.prior, 0.3) * rng.normal() for n, p in robot.parameters.items()})
 
 
-def check_same(made: Robot, robot: Robot, rng: np.random.Generator) -> None:
+def check_same(result: Robot, robot: Robot, rng: np.random.Generator) -> None:
     q = robot.random_configurations(10, rng)
     for target in (None, *(t.name for t in robot.targets)):
-        for actual, expected in zip(made.world_poses(q, target), robot.world_poses(q, target), strict=True):
-            assert_allclose(actual, expected, rtol=0, atol=1e-12, err_msg=f"{robot.name}, {made.history}")
+        for actual, expected in zip(result.world_poses(q, target), robot.world_poses(q, target), strict=True):
+            assert_allclose(actual, expected, rtol=0, atol=1e-12, err_msg=f"{robot.name}, {result.history}")
 
 
 def centres(robot: Robot, q: Array) -> Array:
     """Centres of gravity of the links in the world, ``(masses, n, 3)``."""
-    found = []
+    points = []
     for mass in robot.masses:
         links = Chain((*robot.base_elements, *(e for link in robot.link_elements[: mass.joint] for e in link)))
         kinematics = links.forward_kinematics(robot.variables(q, robot.values), robot.values)
         centre = robot.axial_slides.stayed(mass.joint, mass.cog, robot.values)
-        found.append(kinematics.matrix() @ centre + kinematics.position.T)
-    return np.array(found)
+        points.append(kinematics.matrix() @ centre + kinematics.position.T)
+    return np.array(points)
 
 
 def loads_along_axes(robot: Robot, q: Array) -> Array:
@@ -58,7 +58,7 @@ def loads_along_axes(robot: Robot, q: Array) -> Array:
 
 def test_every_convention_can_be_converted_to_and_no_other() -> None:
     assert set(CONVERSIONS) == {c.name for c in CONVENTIONS}
-    with refused("there is no such convention", "allowed: standard-dh", "Did you mean s-model"):
+    with refusing("there is no such convention", "allowed: standard-dh", "Did you mean s-model"):
         converted(load_robot("irb120"), "s_model")
 
 
@@ -70,9 +70,9 @@ def test_library_robot_goes_into_any_convention_and_calibrated_where_tilts_have_
     for name in CONVERSIONS:
         check_same(converted(plain, name), plain, rng)
         if name not in COMMON_NORMALS:
-            made = converted(robot, name)
-            check_same(made, robot, rng)
-            assert all(p.value == p.nominal for p in made.parameters.values())
+            converted_robot = converted(robot, name)
+            check_same(converted_robot, robot, rng)
+            assert all(p.value == p.nominal for p in converted_robot.parameters.values())
 
 
 @pytest.mark.parametrize("robot_id", ["irb120", "katana450", "kr5", "ur5"])  # one of each build
@@ -80,9 +80,9 @@ def test_library_robot_goes_from_any_convention_to_any(robot_id: str) -> None:
     rng = np.random.default_rng(0)
     robot = load_robot(robot_id)
     for first in CONVERSIONS:
-        made = converted(robot, first)
+        converted_robot = converted(robot, first)
         for second in CONVERSIONS:
-            check_same(converted(made, second), robot, rng)
+            check_same(converted(converted_robot, second), robot, rng)
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)
@@ -99,14 +99,14 @@ def test_random_robot_goes_from_its_convention_to_any(convention: Convention) ->
     robot = replace(robot, masses=masses)
     q = robot.random_configurations(3, rng)
     for name in CONVERSIONS:
-        made = converted(robot, name)
-        check_same(made, robot, rng)
-        if made.masses:
-            assert_allclose(centres(made, q), centres(robot, q), rtol=0, atol=1e-12)
+        converted_robot = converted(robot, name)
+        check_same(converted_robot, robot, rng)
+        if converted_robot.masses:
+            assert_allclose(centres(converted_robot, q), centres(robot, q), rtol=0, atol=1e-12)
         else:
-            assert "left out: link masses" in made.history[-1]
-        expected = loads_along_axes(robot if made.masses else unladen, q)
-        assert_allclose(loads_along_axes(made, q), expected, rtol=0, atol=1e-11)
+            assert "left out: link masses" in converted_robot.history[-1]
+        expected = loads_along_axes(robot if converted_robot.masses else unladen, q)
+        assert_allclose(loads_along_axes(converted_robot, q), expected, rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("stated", [True, False], ids=["stated", "assumed"])
@@ -119,10 +119,10 @@ def test_bearings_stay_where_they_are(stated: bool) -> None:
     robot = robot.with_values({n: p.value + away.get(n[:-2], 0.0) * rng.normal() for n, p in robot.parameters.items()})
     q = robot.random_configurations(20, rng)
     for name in CONVERSIONS:
-        made = converted(robot, name)
-        assert None not in made.bearings[:5], name
-        for ours, theirs in zip(made.world_poses(q), robot.world_poses(q), strict=True):
-            assert not made.masses or np.abs(ours - theirs).max() < 1e-11, name
+        converted_robot = converted(robot, name)
+        assert None not in converted_robot.bearings[:5], name
+        for ours, theirs in zip(converted_robot.world_poses(q), robot.world_poses(q), strict=True):
+            assert not converted_robot.masses or np.abs(ours - theirs).max() < 1e-11, name
 
 
 # -- what stays ------------------------------------------------------------------------------------------
@@ -134,16 +134,23 @@ def test_all_but_the_links_stays() -> None:
     robot = robot.with_values({"gain_2": 1.001, "base_x": 0.4})
     q = robot.random_configurations(3, rng)
     for name in CONVERSIONS:
-        made = converted(robot, name)
-        for own, other in zip(made.joints, robot.joints, strict=True):
+        converted_robot = converted(robot, name)
+        for own, other in zip(converted_robot.joints, robot.joints, strict=True):
             assert (own.name, own.kind, own.limits, own.bearing) == (other.name, other.kind, other.limits, None)
-        assert (made.targets, made.tools, made.effect_names) == (robot.targets, robot.tools, robot.effect_names)
-        assert made.base == robot.base
-        assert (made.parameters["gain_2"].nominal, made.parameters["target_tip_z"].nominal) == (1.001, 0.2)
-        said = f"converted from modified-hayati to {name}; left out: truths tracker-triangular"
-        assert made.history[-1].startswith(said)
-        assert made.truths == {}
-        for ours, theirs in zip(Twin(made).postures(q), Twin(robot).postures(q), strict=True):
+        assert (converted_robot.targets, converted_robot.tools, converted_robot.effect_names) == (
+            robot.targets,
+            robot.tools,
+            robot.effect_names,
+        )
+        assert converted_robot.base == robot.base
+        assert (converted_robot.parameters["gain_2"].nominal, converted_robot.parameters["target_tip_z"].nominal) == (
+            1.001,
+            0.2,
+        )
+        words = f"converted from modified-hayati to {name}; left out: truths tracker-triangular"
+        assert converted_robot.history[-1].startswith(words)
+        assert converted_robot.truths == {}
+        for ours, theirs in zip(Twin(converted_robot).postures(q), Twin(robot).postures(q), strict=True):
             assert_allclose(ours.loads[:, 5], theirs.loads[:, 5], rtol=0, atol=1e-12, err_msg=name)
 
 
@@ -151,9 +158,9 @@ def test_masses_are_left_out_where_the_base_would_turn_under_them() -> None:
     row = {"axis_x": 1.0, "axis_y": 0.0, "axis_z": 0.0, "z": 0.3}
     robot = Robot("arm", "", "", "urdf", (Joint("J1", "revolute", row),), masses=(LinkMass(1, 2.0, (0.1, 0.0, 0.0)),))
     for name in ("mcpc", "standard-dh"):
-        made = converted(robot, name)
-        assert made.masses == ()
-        assert made.history == (
+        converted_robot = converted(robot, name)
+        assert converted_robot.masses == ()
+        assert converted_robot.history == (
             f"converted from urdf to {name}; the base frame now lies on the first axis; "
             "left out: link masses, because the base's z has turned",
         )
@@ -181,9 +188,9 @@ def test_numbers_of_the_textbook() -> None:
 def test_rows_survive_their_own_convention() -> None:
     for name in CONVERSIONS:
         once = converted(load_robot("ur5"), name)
-        for one, other in zip(once.joints, converted(once, name).joints, strict=True):
-            assert list(one.row) == list(other.row)
-            assert_allclose(list(other.row.values()), list(one.row.values()), rtol=0, atol=1e-14, err_msg=name)
+        for first, other in zip(once.joints, converted(once, name).joints, strict=True):
+            assert list(first.row) == list(other.row)
+            assert_allclose(list(other.row.values()), list(first.row.values()), rtol=0, atol=1e-14, err_msg=name)
 
 
 def test_axes_close_to_parallel_get_a_beta_and_others_a_common_normal() -> None:
@@ -192,9 +199,12 @@ def test_axes_close_to_parallel_get_a_beta_and_others_a_common_normal() -> None:
         joints = tuple(Joint(f"J{i}", "revolute", row) for i, row in enumerate(rows))
         robot = Robot("arm", "", "", "modified-dh", joints)
         for name, link in (("hayati", 0), ("modified-hayati", 1)):
-            made = converted(robot, name)
-            assert ["beta" in j.row for j in made.joints] == [close and i == link for i in range(3)], (tilt, name)
-            check_same(made, robot, np.random.default_rng(0))
+            converted_robot = converted(robot, name)
+            assert ["beta" in j.row for j in converted_robot.joints] == [close and i == link for i in range(3)], (
+                tilt,
+                name,
+            )
+            check_same(converted_robot, robot, np.random.default_rng(0))
 
 
 # -- refusals --------------------------------------------------------------------------------------------
@@ -203,5 +213,7 @@ def test_axes_close_to_parallel_get_a_beta_and_others_a_common_normal() -> None:
 def test_nearly_parallel_axes_have_no_common_normal_to_write_down() -> None:
     robot = load_robot("irb120").with_values({"beta_3": np.radians(0.01)})
     for name in COMMON_NORMALS:
-        with refused("axes of two joints are nearly parallel", "axis_2 and axis_3, 0.01 deg", "Hayati's beta", of=name):
+        with refusing(
+            "axes of two joints are nearly parallel", "axis_2 and axis_3, 0.01 deg", "Hayati's beta", of=name
+        ):
             converted(robot, name)

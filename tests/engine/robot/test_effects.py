@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 import truearm
 from truearm.engine.robot.balancers import Anchor, Balancer
@@ -96,13 +96,13 @@ def test_derivatives_are_central_differences_under_load(effect: type[Effect]) ->
     robot = loaded_arm((effect.name,), 3)
     at = robot.loaded(circumstances(robot, 40, 4))
     names = [p.name for e in robot.effects for p in e.parameters]
-    here = robot.forward_kinematics(at, "tip")
-    linear, angular = robot.jacobians(here, at, names)
+    kinematics = robot.forward_kinematics(at, "tip")
+    linear, angular = robot.jacobians(kinematics, at, names)
     for i, name in enumerate(names):
         h = 1e-3 * robot.parameters[name].prior
         values = ({**robot.values, name: robot.values[name] + step} for step in (h, -h))
         ahead, behind = (robot.forward_kinematics(at, "tip", trial) for trial in values)
-        turned = (ahead.matrix() - behind.matrix()) @ np.swapaxes(here.matrix(), 1, 2)
+        turned = (ahead.matrix() - behind.matrix()) @ np.swapaxes(kinematics.matrix(), 1, 2)
         vee = np.stack([turned[:, 2, 1], turned[:, 0, 2], turned[:, 1, 0]])
         for own, moved in ((linear[i], ahead.position - behind.position), (angular[i], vee)):
             atol = 1e-6 * np.abs(own).max() + 1e-13 / h
@@ -126,8 +126,8 @@ def test_nothing_is_nan_where_a_moment_is_zero(effect: type[Effect]) -> None:
     straight_up = np.zeros((1, 6))  # no moment about joint 1, nearly none about the others
     for robot in (laden, replace(laden, masses=(), payload=Payload())):
         kinematics = robot.forward_kinematics(straight_up, "tip")
-        for found in (kinematics.position, *robot.jacobians(kinematics, straight_up, list(robot.parameters))):
-            assert np.isfinite(found).all()
+        for result in (kinematics.position, *robot.jacobians(kinematics, straight_up, list(robot.parameters))):
+            assert np.isfinite(result).all()
 
 
 def test_approach_follows_the_numbers_of_the_configurations() -> None:
@@ -214,7 +214,7 @@ def test_tilts_under_their_own_loads_are_those_of_the_variables() -> None:
 def test_variables_of_another_number_are_refused() -> None:
     robot = load_robot("irb120").with_effects(["bearing-compliance"])
     for variables in (np.zeros((6, 5)), np.zeros(23)):
-        with refused("wrong number of variables", "allowed: (18, n)"):
+        with refusing("wrong number of variables", "allowed: (18, n)"):
             robot.joints_of(variables)
 
 
@@ -269,7 +269,7 @@ def test_only_what_can_be_negative_may_be_stated_so(effect: type[Effect], tmp_pa
         negative = replace(robot.parameters[own.name], **{field: -1e-5})  # type: ignore[arg-type]
         (tmp_path / "robot.yaml").write_text(robot_text(robot.with_parameters([negative])))
         if effect.non_negative:
-            with refused(f"{own.name}.{field}: no joint has a negative one", "allowed: 0 or more"):
+            with refusing(f"{own.name}.{field}: no joint has a negative one", "allowed: 0 or more"):
                 read_robot(tmp_path / "robot.yaml")
         else:
             assert getattr(read_robot(tmp_path / "robot.yaml").parameters[own.name], field) == pytest.approx(-1e-5)
@@ -278,10 +278,10 @@ def test_only_what_can_be_negative_may_be_stated_so(effect: type[Effect], tmp_pa
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_the_python_file_computes_it_or_says_that_it_does_not(effect: type[Effect], tmp_path: Path) -> None:
     robot = replace(loaded_arm((effect.name,), 3), targets=())
-    made = exported(robot, "python")
-    left = [sentence for sentence in made.left_out if f"the joint effect {effect.name};" in sentence]
+    export = exported(robot, "python")
+    left = [sentence for sentence in export.left_out if f"the joint effect {effect.name};" in sentence]
     assert len(left) == (0 if effect.exportable else 1)
-    (tmp_path / "arm.py").write_text(made.text)
+    (tmp_path / "arm.py").write_text(export.text)
     q = robot.random_configurations(20, np.random.default_rng(5))
     position, _ = runpy.run_path(str(tmp_path / "arm.py"))["forward"](q)
     counterpart = robot if effect.exportable else robot.rigid
@@ -328,15 +328,15 @@ def test_no_other_module_lists_effects() -> None:
     names = frozenset(effect.name for effect in EFFECTS)
     assert list(spelled_lists('x = ("gain", 1)\ny = {"gain": "backlash"}\nz = ["other"]\n', names)) == [1, 2]
     package = Path(truearm.__file__).parent
-    found = [
+    places = [
         f"{'.'.join(path.relative_to(package.parent).with_suffix('').parts)}.{line}"
         for path in sorted(package.rglob("*.py"))
         if package / "engine" / "robot" / "effects" not in path.parents
         for line in spelled_lists(path.read_text("utf-8"), names)
     ]
-    assert [place for place in found if not place.startswith(tuple(f"{name}." for name in NAMED_ELSEWHERE))] == []
+    assert [place for place in places if not place.startswith(tuple(f"{name}." for name in NAMED_ELSEWHERE))] == []
     for allowed in NAMED_ELSEWHERE:
-        assert any(place.startswith(f"{allowed}.") for place in found), f"{allowed} needs no exception any more"
+        assert any(place.startswith(f"{allowed}.") for place in places), f"{allowed} needs no exception any more"
 
 
 # -- the curve of a joint: its waves, its sum, its lines in a robot file, and its inverse
@@ -380,9 +380,9 @@ def test_the_sum_is_that_of_parameters_times_shapes() -> None:
     moved = effect.deflection(at, trials)
     assert sorted(moved) == [0, 1, 4]
     for number in range(3):
-        one = effect.deflection(at, {name: float(value[number, 0]) for name, value in trials.items()})
+        deflection = effect.deflection(at, {name: float(value[number, 0]) for name, value in trials.items()})
         for joint, part in moved.items():
-            assert_allclose(part[number], one[joint], rtol=0, atol=1e-15)
+            assert_allclose(part[number], deflection[joint], rtol=0, atol=1e-15)
 
 
 def test_forward_of_inverse_is_the_pose() -> None:
@@ -390,18 +390,18 @@ def test_forward_of_inverse_is_the_pose() -> None:
     q = robot.random_configurations(200, np.random.default_rng(4))
     p, R = robot.world_poses(q)
     assert np.abs(p - robot.rigid.world_poses(q)[0]).max() > 1e-4
-    found = inverse(robot, p, R, frame="world", seed=q)
-    assert found.complete
-    assert np.abs(robot.world_poses(found.joints)[0] - p).max() < 1e-9
-    regular = found.singular_value > 0.05
+    solution = inverse(robot, p, R, frame="world", seed=q)
+    assert solution.complete
+    assert np.abs(robot.world_poses(solution.joints)[0] - p).max() < 1e-9
+    regular = solution.singular_value > 0.05
     assert regular.sum() > 90
-    assert np.abs(found.joints - q)[regular].max() < 1e-9
+    assert np.abs(solution.joints - q)[regular].max() < 1e-9
 
 
 def test_a_file_holds_a_curve_in_a_few_lines(tmp_path: Path) -> None:
     robot = curved(5)
-    one = replace(robot.parameters["curve_sin7_5"], nominal=1e-6)
-    for given_robot in (robot, robot.with_parameters([one])):
+    coefficient = replace(robot.parameters["curve_sin7_5"], nominal=1e-6)
+    for given_robot in (robot, robot.with_parameters([coefficient])):
         text = robot_text(given_robot)
         path = tmp_path / "robot.yaml"
         path.write_text(text)
@@ -469,7 +469,7 @@ SINGLE = "parameters: {curve_sin1_2: {unit: deg, nominal: 0, value: VALUE, prior
 def test_a_wrong_entry_is_refused(tmp_path: Path, old: str, new: str, told: list[str]) -> None:
     text = small_file(lambda text: text.replace(old, new)).replace("VALUE", "0").replace("SHARE", "0.9")
     (tmp_path / "robot.yaml").write_text(text)
-    with refused(*told):
+    with refusing(*told):
         read_robot(tmp_path / "robot.yaml")
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_effects import NAMES as EVERY_EFFECT
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects import EFFECTS
@@ -87,12 +87,12 @@ def test_inverse_of_forward_is_where_the_joints_are(name: str, effects: tuple[st
     pose = robot.forward(q)
     for beside in (0.0, 0.05):
         seed = q + np.random.default_rng(8).uniform(-beside, beside, q.shape)
-        found = robot.inverse(*pose, seed=seed)
-        assert found.complete
+        solution = robot.inverse(*pose, seed=seed)
+        assert solution.complete
         if len(robot.joints) <= 6:
-            assert np.abs(found.joints - q).max() < 1e-8
+            assert np.abs(solution.joints - q).max() < 1e-8
         else:  # a redundant arm reaches the pose in more than one way
-            again = robot.forward(found.joints)
+            again = robot.forward(solution.joints)
             assert np.abs(again[0] - pose[0]).max() < 1e-8
             assert np.abs(again[1] - pose[1]).max() < 1e-8
 
@@ -106,8 +106,8 @@ def test_base_and_world_are_a_rigid_motion_apart() -> None:
         assert_allclose(BASE.rotation @ R, R_world, rtol=0, atol=1e-12)
         assert_array_equal(p_world, robot.forward_kinematics(q, target).position.T)
         for frame, pose in (("base", (p, R)), ("world", (p_world, R_world))):
-            found = robot.inverse(*pose, frame=frame, seed=q, target=target)  # type: ignore[arg-type]
-            assert_allclose(found.joints, q, rtol=0, atol=1e-8, err_msg=f"{target} in {frame}")
+            solution = robot.inverse(*pose, frame=frame, seed=q, target=target)  # type: ignore[arg-type]
+            assert_allclose(solution.joints, q, rtol=0, atol=1e-8, err_msg=f"{target} in {frame}")
 
 
 def test_one_configuration_a_list_and_none_at_all() -> None:
@@ -139,14 +139,14 @@ def test_forward_takes_what_is_known_of_the_postures() -> None:
 def test_a_pose_out_of_reach_has_no_joints() -> None:
     robot = load_robot("irb120")
     p, R = robot.forward(np.array([[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]] * 2))
-    found = robot.inverse(p * [[1.0], [9.0]], R)
-    assert found.status[1] is PoseStatus.UNREACHABLE
-    assert np.isfinite(found.joints[0]).all()
-    assert np.isnan(found.joints[1]).all()
-    assert repr(found).startswith("1 of 2 poses can be reached (1 reached, 1 unreachable)\npose 1: ")
-    assert "<pre>1 of 2 poses" in found._repr_html_()
-    assert "No joints give the pose: move it" in found.advice(1)
-    assert "nearest" not in repr(found)
+    solution = robot.inverse(p * [[1.0], [9.0]], R)
+    assert solution.status[1] is PoseStatus.UNREACHABLE
+    assert np.isfinite(solution.joints[0]).all()
+    assert np.isnan(solution.joints[1]).all()
+    assert repr(solution).startswith("1 of 2 poses can be reached (1 reached, 1 unreachable)\npose 1: ")
+    assert "<pre>1 of 2 poses" in solution._repr_html_()
+    assert "No joints give the pose: move it" in solution.advice(1)
+    assert "nearest" not in repr(solution)
 
 
 def test_what_is_said_to_be_reached_is_where_the_arm_goes() -> None:
@@ -155,12 +155,12 @@ def test_what_is_said_to_be_reached_is_where_the_arm_goes() -> None:
     poses = plain.forward(np.random.default_rng(0).uniform(-0.3, 0.3, (8, 3)))
     for gain in (-1.0, 0.0, 0.0015, 0.1, 1.9):
         arm = plain.with_effects(["gain"]).with_values({f"gain_{i}": gain for i in range(1, 4)})
-        found = arm.inverse(*poses)
-        usable = found.usable
+        solution = arm.inverse(*poses)
+        usable = solution.usable
         assert usable.any() is np.bool_(gain > 1.0), gain
-        assert_allclose(arm.forward(found.joints[usable])[0], poses[0][usable], rtol=0, atol=1e-9)
-        assert (found.position_error[usable] <= 1e-9).all()
-        assert ((found.position_error > 1e-9) | (found.orientation_error > 1e-9))[~usable].all()
+        assert_allclose(arm.forward(solution.joints[usable])[0], poses[0][usable], rtol=0, atol=1e-9)
+        assert (solution.position_error[usable] <= 1e-9).all()
+        assert ((solution.position_error > 1e-9) | (solution.orientation_error > 1e-9))[~usable].all()
 
 
 # -- the Jacobian -----------------------------------------------------------------------------------------
@@ -250,7 +250,7 @@ def test_what_is_none_is_refused_with_its_parameter() -> None:
     ]
     for parameter, call, values in wrong:
         for value in values:
-            with refused(parameter=parameter, of=f"{parameter} {value!r}"):
+            with refusing(parameter=parameter, of=f"{parameter} {value!r}"):
                 call(value)
 
 
@@ -266,7 +266,7 @@ def test_misspelt_names_are_offered() -> None:
         ("base_x", lambda: robot.with_values({"base_xx": 0.0})),
     ]
     for meant, call in calls:
-        with refused(f"Did you mean {meant}", of=meant):
+        with refusing(f"Did you mean {meant}", of=meant):
             call()
 
 
@@ -281,7 +281,7 @@ def test_payloads_are_arrays_or_texts_in_which_zero_needs_no_unit() -> None:
     assert Payload.of_text("300g,0.0,-0,0.1m") == Payload(0.3, (0.0, 0.0, 0.1))
     assert Payload.of_text("0,0,0,0") == Payload(0.0, (0.0, 0.0, 0.0))
     for text in ("3kg,0,0,120", "3,0,0,120mm", "3kg,0kg,0,120mm", "3kg,0,,120mm", "3kg,0 cm,0,120mm"):
-        with refused("unit", of=text):
+        with refusing("unit", of=text):
             Payload.of_text(text)
 
 

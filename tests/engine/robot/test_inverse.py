@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_effects import NAMES, loaded_arm
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.branches import BRANCHES, BranchRule, branch_rule
@@ -82,13 +82,13 @@ def test_forward_of_inverse_is_the_pose_on_the_branch_asked_for(name: str) -> No
         number = rule.numbers(robot.forward_kinematics(q))
         for k in np.unique(number):
             chosen = number == k
-            found = inverse(robot, p[chosen], R[chosen], frame="world", branch=BRANCHES[k])
-            there = np.array([status.usable for status in found.status])
-            for row in np.flatnonzero(~there):
-                assert found.status[row] is PoseStatus.BEYOND_LIMIT
-                assert found.singular_value[row] < 0.05
-            assert {found.branch[row] for row in np.flatnonzero(there)} == {BRANCHES[k]}
-            errors = pose_errors(robot, found.joints[there], p[chosen][there], R[chosen][there])
+            solution = inverse(robot, p[chosen], R[chosen], frame="world", branch=BRANCHES[k])
+            usable = np.array([status.usable for status in solution.status])
+            for row in np.flatnonzero(~usable):
+                assert solution.status[row] is PoseStatus.BEYOND_LIMIT
+                assert solution.singular_value[row] < 0.05
+            assert {solution.branch[row] for row in np.flatnonzero(usable)} == {BRANCHES[k]}
+            errors = pose_errors(robot, solution.joints[usable], p[chosen][usable], R[chosen][usable])
             assert max(errors) < 1e-9, (gain, BRANCHES[k])
 
 
@@ -161,16 +161,16 @@ def test_angles_rounded_to_four_digits_as_in_urdf_files_still_have_named_branche
     joints = tuple(replace(j, row={c: round(v, 4) for c, v in j.row.items()}) for j in robot.joints)
     robot = replace(robot, joints=joints)
     p, R = robot.world_poses(robot.random_configurations(50, np.random.default_rng(0)))
-    found = inverse(robot, p, R, frame="world", branch="all")
-    assert found.complete
-    assert len(found.pose) > 300
+    solution = inverse(robot, p, R, frame="world", branch="all")
+    assert solution.complete
+    assert len(solution.pose) > 300
 
 
 def test_branches_that_have_no_names() -> None:
     for robot in (load_robot("katana450"), seven_axes()):
         assert branch_rule(robot) is None
         p, R = robot.world_poses(np.zeros((1, len(robot.joints))))
-        with refused("have no names", of=robot.name):
+        with refusing("have no names", of=robot.name):
             inverse(robot, p, R, branch="front-up-noflip")
 
 
@@ -196,9 +196,9 @@ def test_under_load_forward_of_inverse_is_the_pose_on_every_branch(effects: tupl
     assert {*zip(every.pose.tolist(), every.branch, strict=True)} >= {*enumerate(branches)}
     for branch in sorted(set(branches)):
         rows = [row for row, own in enumerate(branches) if own == branch]
-        one = inverse(robot, p[rows], R[rows], frame="world", target="tip", branch=branch)
-        assert set(one.branch) == {branch}
-        assert max(one.position_error.max(), one.orientation_error.max()) < 1e-9, branch
+        solution = inverse(robot, p[rows], R[rows], frame="world", target="tip", branch=branch)
+        assert set(solution.branch) == {branch}
+        assert max(solution.position_error.max(), solution.orientation_error.max()) < 1e-9, branch
 
 
 @pytest.mark.parametrize("effects", [("gain",), ELASTIC, FULL, TILTING, NAMES], ids="+".join)
@@ -206,11 +206,11 @@ def test_the_seed_gives_the_same_joints_back(effects: tuple[str, ...]) -> None:
     robot = calibrated(loaded_arm(effects, 13), 1)
     q = robot.random_configurations(200, np.random.default_rng(2))
     p, R = robot.world_poses(q)
-    found = inverse(robot, p, R, frame="world", seed=q)
-    assert found.complete
-    regular = found.singular_value > 0.05
+    solution = inverse(robot, p, R, frame="world", seed=q)
+    assert solution.complete
+    regular = solution.singular_value > 0.05
     assert regular.sum() > 90
-    assert np.abs(found.joints - q)[regular].max() < 1e-9
+    assert np.abs(solution.joints - q)[regular].max() < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -225,9 +225,9 @@ def test_under_load_other_arms_and_tasks(name: str, orientation: Any) -> None:
     q = robot.random_configurations(60, np.random.default_rng(1))
     p, R = robot.world_poses(q)
     seed = q + 0.02 * np.random.default_rng(2).standard_normal(q.shape)
-    found = inverse(robot, p, R, frame="world", orientation=orientation, seed=seed)
-    assert found.complete
-    check_task(robot, found.joints, p, R, orientation)
+    solution = inverse(robot, p, R, frame="world", orientation=orientation, seed=seed)
+    assert solution.complete
+    check_task(robot, solution.joints, p, R, orientation)
 
 
 def test_a_shaft_that_nothing_lays_to_a_side_is_no_obstacle() -> None:
@@ -235,9 +235,9 @@ def test_a_shaft_that_nothing_lays_to_a_side_is_no_obstacle() -> None:
     robot = replace(loaded_arm(("clearance",), 1), payload=Payload(2.7, (0.0, 0.0, 0.1)))
     robot = replace(robot, masses=robot.masses[:-1])
     down = np.diag([1.0, -1.0, -1.0])
-    found = inverse(robot, [[0.35, 0.05, 0.35]], down[None])
-    assert found.complete
-    position, rotation = robot.world_poses(found.joints)
+    solution = inverse(robot, [[0.35, 0.05, 0.35]], down[None])
+    assert solution.complete
+    position, rotation = robot.world_poses(solution.joints)
     np.testing.assert_allclose(position, [[0.35, 0.05, 0.35]], rtol=0, atol=1e-9)
     np.testing.assert_allclose(rotation[0], down, rtol=0, atol=1e-9)
 
@@ -250,9 +250,9 @@ def test_an_offset_shared_between_base_and_joint_is_no_error_of_the_start() -> N
     robot = robot.with_values(robot.truths["tracker-triangular"].values)  # d_1 is 0: it stands in base_z
     q = robot.random_configurations(200, np.random.default_rng(0))
     p, R = robot.world_poses(q)
-    found = inverse(robot, p, R, frame="world", seed=q)
-    assert found.complete
-    assert (np.abs(found.joints - q).max(axis=1) < 1e-6).sum() >= 198
+    solution = inverse(robot, p, R, frame="world", seed=q)
+    assert solution.complete
+    assert (np.abs(solution.joints - q).max(axis=1) < 1e-6).sum() >= 198
 
 
 # -- limits, turns, statuses ------------------------------------------------------------------------------
@@ -264,40 +264,40 @@ def test_the_turn_nearest_to_the_seed_within_the_limits(gain: bool) -> None:
     p, R = robot.world_poses(np.radians([[10, 20, -30, 40, 50, 300.0]]))
     # The last seed is beyond the limits: 300 is the last turn before 400.
     for turn, seed in ((300.0, 310.0), (-60.0, 0.0), (-60.0, -200.0), (300.0, 700.0)):
-        found = inverse(robot, p, R, frame="world", branch="front-up-noflip", seed=np.radians([0, 0, 0, 0, 0, seed]))
-        assert found.complete
-        assert np.degrees(found.joints[0, 5]) == pytest.approx(turn, abs=1.0)
-        assert pose_errors(robot, found.joints, p, R)[0] < 1e-9
+        solution = inverse(robot, p, R, frame="world", branch="front-up-noflip", seed=np.radians([0, 0, 0, 0, 0, seed]))
+        assert solution.complete
+        assert np.degrees(solution.joints[0, 5]) == pytest.approx(turn, abs=1.0)
+        assert pose_errors(robot, solution.joints, p, R)[0] < 1e-9
 
 
 def test_beyond_limit_names_the_joints() -> None:
     robot = load_robot("irb120")
     q = np.radians([[10, 20, 80, 40, 50, 0.0]])  # axis 3 ends at 70
     p, R = robot.world_poses(q)
-    found = inverse(robot, p, R, frame="world", branch=branches_of(robot, q)[0])
-    assert found.status == (PoseStatus.BEYOND_LIMIT,)
-    assert found.beyond.tolist() == [[False, False, True, False, False, False]]
-    assert np.abs(found.joints - q).max() < 1e-9
-    assert found.advice(0).startswith("Beyond its limits: axis_3.")
-    assert not found.complete
+    solution = inverse(robot, p, R, frame="world", branch=branches_of(robot, q)[0])
+    assert solution.status == (PoseStatus.BEYOND_LIMIT,)
+    assert solution.beyond.tolist() == [[False, False, True, False, False, False]]
+    assert np.abs(solution.joints - q).max() < 1e-9
+    assert solution.advice(0).startswith("Beyond its limits: axis_3.")
+    assert not solution.complete
 
 
 def test_near_singular_is_reached_with_a_warning() -> None:
     robot = calibrated(load_robot("irb120"), 2)
     q = np.radians([[10, 20, 30, 40, 0.05, 0.0], [10, 20, 30, 40, 50, 0.0]])
     p, R = robot.world_poses(q)
-    found = inverse(robot, p, R, frame="world")
-    assert found.status == (PoseStatus.NEAR_SINGULAR, PoseStatus.REACHED)
-    assert found.complete
-    assert found.singular_value[0] < 5e-3 < found.singular_value[1]
-    assert "singular posture" in found.advice(0)
+    solution = inverse(robot, p, R, frame="world")
+    assert solution.status == (PoseStatus.NEAR_SINGULAR, PoseStatus.REACHED)
+    assert solution.complete
+    assert solution.singular_value[0] < 5e-3 < solution.singular_value[1]
+    assert "singular posture" in solution.advice(0)
 
 
 def test_a_pose_out_of_reach_comes_with_the_nearest_joints() -> None:
     robot = calibrated(load_robot("li3"), 2)
     stretched = robot.world_poses(np.radians([[20, 40, 0]]))[0]
     aim = np.vstack([1.5 * stretched, 0.7 * stretched])
-    found = inverse(robot, aim, orientation="free")
+    solution = inverse(robot, aim, orientation="free")
 
     def miss(q: Array) -> Array:
         return np.asarray(robot.world_poses(q[None])[0][0] - aim[0])
@@ -307,33 +307,33 @@ def test_a_pose_out_of_reach_comes_with_the_nearest_joints() -> None:
         np.linalg.norm(least_squares(miss, s, bounds=(low, high), xtol=1e-12).fun)
         for s in robot.random_configurations(10, np.random.default_rng(0))
     )
-    assert found.status == (PoseStatus.UNREACHABLE, PoseStatus.REACHED)
-    assert found.position_error[0] == pytest.approx(best, rel=1e-6)
-    assert np.linalg.norm(robot.world_poses(found.joints)[0][0] - aim[0]) == pytest.approx(best, rel=1e-6)
-    assert found.advice(0).startswith(f"{best * 1e3:.4g} mm are missing.")
+    assert solution.status == (PoseStatus.UNREACHABLE, PoseStatus.REACHED)
+    assert solution.position_error[0] == pytest.approx(best, rel=1e-6)
+    assert np.linalg.norm(robot.world_poses(solution.joints)[0][0] - aim[0]) == pytest.approx(best, rel=1e-6)
+    assert solution.advice(0).startswith(f"{best * 1e3:.4g} mm are missing.")
 
 
 def test_out_of_reach_on_all_branches_has_one_row() -> None:
     robot = calibrated(load_robot("irb120"), 2)
     p, R = robot.world_poses(np.radians([[10, 20, 30, 40, 50, 0.0]]))
-    found = inverse(robot, np.vstack([p, 3 * p]), np.vstack([R, R]), frame="world", branch="all")
-    assert Counter(found.pose.tolist())[1] == 1
-    assert found.status[-1] is PoseStatus.UNREACHABLE
-    assert found.position_error[-1] > 0.3
-    assert "mm and" in found.advice(len(found.pose) - 1)
-    assert not found.complete
-    assert found.rows(PoseStatus.UNREACHABLE).tolist() == [len(found.pose) - 1]
+    solution = inverse(robot, np.vstack([p, 3 * p]), np.vstack([R, R]), frame="world", branch="all")
+    assert Counter(solution.pose.tolist())[1] == 1
+    assert solution.status[-1] is PoseStatus.UNREACHABLE
+    assert solution.position_error[-1] > 0.3
+    assert "mm and" in solution.advice(len(solution.pose) - 1)
+    assert not solution.complete
+    assert solution.rows(PoseStatus.UNREACHABLE).tolist() == [len(solution.pose) - 1]
 
 
 def test_a_branch_that_does_not_reach_the_pose_is_lost_and_another_one_given() -> None:
     robot = calibrated(load_robot("irb1600"), 2)
     q = np.radians([[10, 80, -70, 40, 50, 0.0]])  # far in front: no reaching over the back
     p, R = robot.world_poses(q)
-    found = inverse(robot, p, R, frame="world", branch="back-up-noflip")
-    assert found.status == (PoseStatus.BRANCH_LOST,)
-    assert found.branch[0].startswith("front")
-    assert found.position_error[0] < 1e-9
-    assert found.advice(0).startswith(f"Reached on {found.branch[0]}.")
+    solution = inverse(robot, p, R, frame="world", branch="back-up-noflip")
+    assert solution.status == (PoseStatus.BRANCH_LOST,)
+    assert solution.branch[0].startswith("front")
+    assert solution.position_error[0] < 1e-9
+    assert solution.advice(0).startswith(f"Reached on {solution.branch[0]}.")
 
 
 # -- other arms and tasks ---------------------------------------------------------------------------------
@@ -360,10 +360,10 @@ def test_arms_and_tasks_without_closed_form(nominal: Robot, orientation: Any) ->
     near = inverse(robot, p, R, frame="world", orientation=orientation, seed=seed)
     assert near.complete
     assert set(near.branch) == {""}
-    found = inverse(robot, p, R, frame="world", orientation=orientation)
-    reached = [status is not PoseStatus.UNREACHABLE for status in found.status]
+    solution = inverse(robot, p, R, frame="world", orientation=orientation)
+    reached = [status is not PoseStatus.UNREACHABLE for status in solution.status]
     assert np.mean(reached) >= 0.97
-    for solutions in (near, found):
+    for solutions in (near, solution):
         rows = solutions.rows(PoseStatus.REACHED, PoseStatus.NEAR_SINGULAR, PoseStatus.BEYOND_LIMIT)
         check_task(robot, solutions.joints[rows], p[rows], R[rows], orientation)
         assert np.isnan(solutions.orientation_error).all() == (orientation == "free")
@@ -383,9 +383,9 @@ def test_same_question_same_answer_and_no_poses_none() -> None:
     one, two = (inverse(robot, p, R, frame="world").joints for _ in range(2))
     assert (one == two).all()
     for robot in (load_robot("irb120"), load_robot("katana450")):
-        found = inverse(robot, np.zeros((0, 3)), np.zeros((0, 3, 3)))
-        assert found.complete
-        assert found.joints.shape == (0, len(robot.joints))
+        solution = inverse(robot, np.zeros((0, 3)), np.zeros((0, 3, 3)))
+        assert solution.complete
+        assert solution.joints.shape == (0, len(robot.joints))
 
 
 # -- refusals ---------------------------------------------------------------------------------------------
@@ -410,10 +410,10 @@ def test_refusals() -> None:
         ("have no names", P, R, {"branch": "all", "orientation": "free"}),
     ]
     for words, p, r, options in wrong:
-        with refused(words, of=options):
+        with refusing(words, of=options):
             inverse(load_robot("irb120"), p, r, **options)
     short = replace(sliding(), joints=sliding().joints[:2])
-    with refused("three joints or more"):
+    with refusing("three joints or more"):
         inverse(short, P, orientation="free")
 
 
@@ -428,7 +428,7 @@ def test_next_to_a_singular_wrist_branches_are_found_that_the_nominal_arm_has_no
         number = rule_of(robot).numbers(robot.forward_kinematics(q))
         lost = 0
         for k in sorted(set(number.tolist())):
-            mine = number == k
-            found = inverse(robot, position[mine], rotation[mine], branch=BRANCHES[k])
-            lost += sum(status is PoseStatus.BRANCH_LOST for status in found.status)
+            rows = number == k
+            solution = inverse(robot, position[rows], rotation[rows], branch=BRANCHES[k])
+            lost += sum(status is PoseStatus.BRANCH_LOST for status in solution.status)
         assert lost <= 1, seed

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_frame, random_robot, random_unit
+from tests.expecting import refusing
 from tests.pinocchio_oracle import Body, PinocchioChain
 
 from truearm import InputError
@@ -119,12 +119,12 @@ def by_pinocchio(robot: Robot, variables: Array, velocity: Array, acceleration: 
     lever = [bearing_of(elements, elements.index(e), robot) * np.array(axis_of(e)) for e in joints]
     loads = np.empty((len(joints), 6, variables.shape[1]))
     for k in range(variables.shape[1]):
-        held = oracle.reactions(
+        reactions = oracle.reactions(
             variables[:, k], velocity[:, k], acceleration[:, k], np.array(robot.gravity), wrench[:, k]
         )
         for i, axes in enumerate(own_axes):
-            moment = held[i, 3:] - np.cross(lever[i], held[i, :3])
-            loads[i, :3, k], loads[i, 3:, k] = -axes @ held[i, :3], -axes @ moment
+            moment = reactions[i, 3:] - np.cross(lever[i], reactions[i, :3])
+            loads[i, :3, k], loads[i, 3:, k] = -axes @ reactions[i, :3], -axes @ moment
     return loads
 
 
@@ -133,8 +133,8 @@ def compare_with_pinocchio(robot: Robot, rng: np.random.Generator) -> None:
     still, none = np.zeros_like(velocity), np.zeros_like(wrench)
     for v, a, w in ((None, None, None), (None, None, wrench), (velocity, acceleration, None), (velocity, None, wrench)):
         actual = joint_loads(robot, variables, velocity=v, acceleration=a, wrench=w)
-        given = (rest if values is None else values for values, rest in ((v, still), (a, still), (w, none)))
-        expected = by_pinocchio(robot, variables, *given)
+        inputs = (default if values is None else values for values, default in ((v, still), (a, still), (w, none)))
+        expected = by_pinocchio(robot, variables, *inputs)
         for part in (slice(0, 3), slice(3, 6)):
             size = np.abs(expected[:, part]).max()
             assert size > 0.1
@@ -163,7 +163,7 @@ def test_library_robot_agrees_with_pinocchio() -> None:
 
 def lever(**changes: object) -> Robot:
     """A level axis along y of the base and, at zero, a weightless arm of 0.8 m along x with 2 kg at its end."""
-    made = Robot(
+    robot = Robot(
         name="lever",
         title="lever",
         source="made up",
@@ -172,7 +172,7 @@ def lever(**changes: object) -> Robot:
         flange=Transform((0.8, 0.0, 0.0)),
         payload=Payload(2.0),
     )
-    return replace(made, **changes)  # type: ignore[arg-type]
+    return replace(robot, **changes)  # type: ignore[arg-type]
 
 
 def test_level_arm_sags_forward() -> None:
@@ -183,8 +183,8 @@ def test_level_arm_sags_forward() -> None:
     assert_allclose(loads[0, :2], weight * np.array([np.sin(q[0]), np.cos(q[0])]), rtol=0, atol=1e-14)
     assert_allclose(loads[0, 2:5], 0.0, rtol=0, atol=1e-14)
     assert loads[0, 5, 0] > 0  # turning forward, about y of the base, lowers the arm
-    held, sagged = (lever().world_poses(np.array([[turn]]))[0][0, 2] for turn in (0.0, 1e-4 * loads[0, 5, 0]))
-    assert sagged < held
+    straight, sagged = (lever().world_poses(np.array([[turn]]))[0][0, 2] for turn in (0.0, 1e-4 * loads[0, 5, 0]))
+    assert sagged < straight
 
 
 def test_weight_beside_the_plane_of_an_arm_twists_its_bearing() -> None:
@@ -279,7 +279,7 @@ def test_further_variables_of_the_chain_are_no_joints() -> None:
 
 def test_array_of_another_shape_is_refused() -> None:
     for name, shape in (("velocity", (7, 6)), ("acceleration", (5, 7)), ("wrench", (7, 6))):
-        with refused(name, "irb120", str(shape), "(6, 7)", of=name):
+        with refusing(name, "irb120", str(shape), "(6, 7)", of=name):
             joint_loads(load_robot("irb120"), np.zeros((6, 7)), **{name: np.zeros(shape)})
 
 
@@ -332,8 +332,8 @@ def springy(name: str, rng: np.random.Generator) -> tuple[Robot, Twin]:
     robot = replace(robot.with_frames(random_frame(rng), {"tip": (0.03, 0.02, 0.1)}), rated_load=None)
     robot = robot.with_payload("0.5kg,10mm,20mm,60mm")
     truths = {i: JointTruth(compliance=c) for i, c in enumerate(rng.uniform(1e-5, 2e-4, len(robot.joints)), 1)}
-    made = robot.with_effects(["compliance"])
-    return made.with_values({f"compliance_{i}": t.compliance for i, t in truths.items()}), Twin(robot, truths)
+    arm = robot.with_effects(["compliance"])
+    return arm.with_values({f"compliance_{i}": t.compliance for i, t in truths.items()}), Twin(robot, truths)
 
 
 # -- how it is given -------------------------------------------------------------------------------------
@@ -369,10 +369,10 @@ def test_what_is_no_wrench_is_refused() -> None:
         ([1, 2, 3, 4, 5, math.inf], "NaN and infinity cannot be used"),
         (80, "a wrench belongs here"),
     ]
-    for given, said in wrong:
-        with refused(said, parameter="wrench", of=given):
-            Wrench.of(given)
-    with refused("no frame of this name", "allowed: base, tool, world, controller"):
+    for value, words in wrong:
+        with refusing(words, parameter="wrench", of=value):
+            Wrench.of(value)
+    with refusing("no frame of this name", "allowed: base, tool, world, controller"):
         Wrench(FORCE, MOMENT, "tol")  # type: ignore[arg-type]
 
 
@@ -439,10 +439,10 @@ def test_the_arm_bends_as_the_twin_does(name: str) -> None:
         model, twin = springy(name, rng)
         tool, q = drawn_place(rng), model.random_configurations(8, rng)
         wrench = Wrench(FORCE, MOMENT, frame)
-        found = replace(twin, robot=twin.robot.with_wrench(wrench, tool)).frames(q)["tip"]
+        result = replace(twin, robot=twin.robot.with_wrench(wrench, tool)).frames(q)["tip"]
         position, rotation = model.with_wrench(wrench, tool).world_poses(q, "tip")
-        assert_allclose(found[:, :3, 3], position, rtol=0, atol=1e-9, err_msg=frame)
-        assert_allclose(found[:, :3, :3], rotation, rtol=0, atol=1e-9, err_msg=frame)
+        assert_allclose(result[:, :3, 3], position, rtol=0, atol=1e-9, err_msg=frame)
+        assert_allclose(result[:, :3, :3], rotation, rtol=0, atol=1e-9, err_msg=frame)
         assert np.linalg.norm(position - model.world_poses(q, "tip")[0], axis=1).min() > 1e-5
 
 
@@ -472,11 +472,11 @@ def test_poses_are_reached_under_the_force(name: str) -> None:
         pushed = model.with_wrench(Wrench(FORCE, MOMENT, frame), "tip")
         q = rng.uniform(-1.0, 1.0, (6, 6))
         wanted = model.forward(q, target="tip")
-        found = pushed.inverse(*wanted, target="tip", seed=q)
-        assert found.complete
-        for own, pose in zip(pushed.forward(found.joints, target="tip"), wanted, strict=True):
+        solution = pushed.inverse(*wanted, target="tip", seed=q)
+        assert solution.complete
+        for own, pose in zip(pushed.forward(solution.joints, target="tip"), wanted, strict=True):
             assert np.abs(own - pose).max() < 2e-9, frame
-        assert np.abs(found.joints - q).max() > 1e-5
+        assert np.abs(solution.joints - q).max() > 1e-5
 
 
 def test_the_jacobian_is_the_derivative_under_the_force() -> None:
@@ -494,9 +494,9 @@ def test_more_than_the_rated_load_is_refused() -> None:
     robot = load_robot("irb120")
     assert robot.rated_load == 3.0
     assert robot.with_wrench(Wrench((0.0, 29.4, 0.0))).wrench is not None
-    with refused("force is larger than irb120 is rated for; got '29.5 N'", "29.42 N"):
+    with refusing("force is larger than irb120 is rated for; got '29.5 N'", "29.42 N"):
         robot.with_wrench(Wrench((0.0, 29.5, 0.0)))
-    with refused("moment is larger than irb120 is rated for; got '40 N m'"):
+    with refusing("moment is larger than irb120 is rated for; got '40 N m'"):
         robot.with_wrench(Wrench((0.0, 0.0, 0.0), (0.0, 0.0, 40.0)))
     unknown = replace(robot, rated_load=None)
     assert unknown.with_wrench(Wrench((0.0, 500.0, 0.0))).wrench is not None
@@ -516,7 +516,7 @@ def test_nothing_is_taken_away_by_none_or_zero() -> None:
 def test_no_file_holds_what_acts_on_the_tool() -> None:
     robot = load_robot("irb120").with_wrench(Wrench((0.0, 5.0, 0.0)))
     for written in (robot_text, lambda robot: export(robot, "json")):
-        with refused("no file of a robot holds an external force"):
+        with refusing("no file of a robot holds an external force"):
             written(robot)
 
 

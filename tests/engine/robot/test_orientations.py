@@ -54,8 +54,8 @@ X_THEN_Z = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])  # 90 about x, then 9
     ],
 )
 def test_examples_worked_by_hand(orientation: Orientation, numbers: list[float], matrix: np.ndarray) -> None:
-    given = np.array([numbers], float)
-    turned = given if orientation is QUATERNION else np.radians(given)
+    numbers_read = np.array([numbers], float)
+    turned = numbers_read if orientation is QUATERNION else np.radians(numbers_read)
     np.testing.assert_allclose(orientation.matrices(turned)[0], matrix, atol=1e-15)
 
 
@@ -117,9 +117,9 @@ def test_gimbal_lock_keeps_the_angle_that_is_free() -> None:
     for orientation in ANGLES:
         for side in (1, -1):
             near = np.array([[0.3, side * np.pi / 2, -1.1]])
-            kept = {ZYX_ANGLES.name: 0, FIXED_XYZ_ANGLES.name: 2, MOVING_XYZ_ANGLES.name: 2}[orientation.name]
+            free_angle = {ZYX_ANGLES.name: 0, FIXED_XYZ_ANGLES.name: 2, MOVING_XYZ_ANGLES.name: 2}[orientation.name]
             locked = near.copy()
-            locked[0, 2 - kept] += 0.2
+            locked[0, 2 - free_angle] += 0.2
             R = orientation.matrices(locked)
             numbers = orientation.numbers(R, near)
             np.testing.assert_allclose(orientation.matrices(numbers), R, atol=1e-9)

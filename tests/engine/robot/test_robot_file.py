@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.units import SHOWN_AS, to_si, written
 from truearm.engine.robot.effects import EFFECTS
@@ -174,18 +174,18 @@ OTHERS: list[tuple[str, list[str]]] = [
 def test_refused(tmp_path: Path) -> None:
     changes = [(changed(old, new), parts) for old, new, parts in CHANGES]
     for text, parts in [*changes, *((f"{PLAIN}{entry}\n", parts) for entry, parts in ADDITIONS), *OTHERS]:
-        with refused("robot.yaml", *parts, of=parts):
+        with refusing("robot.yaml", *parts, of=parts):
             read(tmp_path, text)
 
 
 def test_folder_file_that_is_not_there_and_text_that_is_not_utf8_are_refused(tmp_path: Path) -> None:
-    with refused(f"{tmp_path}: this is a folder, a file is needed."):
+    with refusing(f"{tmp_path}: this is a folder, a file is needed."):
         read_robot(tmp_path)
     path = tmp_path / "robot.yaml"
     path.write_bytes(PLAIN.replace("Plain arm", "Größe").encode("latin-1"))
-    with refused("not UTF-8"):
+    with refusing("not UTF-8"):
         read_robot(path)
-    with refused("robto.yaml: there is no such file", "Did you mean robot.yaml?"):
+    with refusing("robto.yaml: there is no such file", "Did you mean robot.yaml?"):
         read_robot(tmp_path / "robto.yaml")
 
 
@@ -356,7 +356,7 @@ def test_inertia_of_thin_and_flat_bodies_is_read(tmp_path: Path) -> None:
 
 def test_two_targets_of_one_name_are_refused(tmp_path: Path) -> None:
     robot = read(tmp_path, PLAIN.split("truths:")[0] + "targets: [{name: '1'}, {name: target_1}]\n")
-    with refused("same name", "target_1_x", "Rename the target"):
+    with refusing("same name", "target_1_x", "Rename the target"):
         _ = robot.parameters
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests import ur_controller as ur
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.library import load_robot
@@ -51,7 +51,7 @@ def written(folder: Path, text: str, name: str = "calibration.conf") -> Path:
     return path
 
 
-def made(folder: Path, text: str, robot: str) -> Robot:
+def arm_of(folder: Path, text: str, robot: str) -> Robot:
     return with_kinematics(load_robot(robot), read_kinematics(written(folder, text)))
 
 
@@ -66,10 +66,10 @@ PUBLISHED = ((ur.UR10_CONF, "ur10"), (ur.UR3E_CONF, "ur3e"), (ur10e_conf(), "ur1
 def test_poses_are_those_of_the_controllers_table_and_frames_lie_beside_the_nominal_ones(tmp_path: Path) -> None:
     # Three arms as they were published, with d up to 446 m.
     for conf, robot in PUBLISHED:
-        arm, type_ = made(tmp_path, conf, robot), load_robot(robot)
+        arm, type_ = arm_of(tmp_path, conf, robot), load_robot(robot)
         expected = ur.forward(ur.table(robot, conf), JOINTS)
-        for one in (arm, controller_robot(arm)):
-            positions, rotations = one.world_poses(JOINTS)
+        for model in (arm, controller_robot(arm)):
+            positions, rotations = model.world_poses(JOINTS)
             assert_allclose(positions, expected[:, :3, 3], rtol=0, atol=1e-9, err_msg=robot)
             assert_allclose(rotations, expected[:, :3, :3], rtol=0, atol=1e-9, err_msg=robot)
         for unit, most in (("m", 2e-3), ("rad", 0.01)):
@@ -80,33 +80,33 @@ def test_poses_are_those_of_the_controllers_table_and_frames_lie_beside_the_nomi
 
 def test_a_file_of_another_type_or_kind_is_refused(tmp_path: Path) -> None:
     for conf, robot in ((ur.UR10_CONF, "ur5e"), (ur.UR3E_CONF, "ur5"), (ur10e_conf(), "ur3e")):
-        with refused("another type of robot; got 'a flange ", " mm from that of ur", "allowed: 20 mm", of=robot):
-            refuse_far(made(tmp_path, conf, robot), load_robot(robot), "calibration.conf")
+        with refusing("another type of robot; got 'a flange ", " mm from that of ur", "allowed: 20 mm", of=robot):
+            refuse_far(arm_of(tmp_path, conf, robot), load_robot(robot), "calibration.conf")
     for robot in ("irb120", "li3", "kr5"):
         with pytest.raises(InputError, match=r"another kind is given|must have the table and the frames"):
-            made(tmp_path, ur.UR10_CONF, robot)
+            arm_of(tmp_path, ur.UR10_CONF, robot)
     for robot in ("irb120", "li3", "katana450"):
-        with refused("no arm of the kind that the format describes", of=robot):
+        with refusing("no arm of the kind that the format describes", of=robot):
             exported(load_robot(robot), "ur-kinematics")
 
 
 def test_angles_of_the_ros_driver_are_read_in_the_order_in_which_it_writes_them(tmp_path: Path) -> None:
     # A DH link leads along the next axis: so it does with Rx Ry Rz, and with the order of URDF it misses that.
-    found = read_kinematics(written(tmp_path, ROS, "ros.yaml"))
-    assert found.frames is not None
-    for frame in (found.frames[4], found.frames[5]):
+    kinematics = read_kinematics(written(tmp_path, ROS, "ros.yaml"))
+    assert kinematics.frames is not None
+    for frame in (kinematics.frames[4], kinematics.frames[5]):
         along = frame[:3, 3] - [frame[0, 3], 0, 0]
         assert np.linalg.norm(np.cross(along / np.linalg.norm(along), frame[:3, 2])) < 1e-12
-    assert found.identity == {"hash": "calib_15200003067234149431"}
-    assert 0.5e-3 < mean_distance(with_kinematics(load_robot("ur5"), found), load_robot("ur5")) < 3e-3
+    assert kinematics.identity == {"hash": "calib_15200003067234149431"}
+    assert 0.5e-3 < mean_distance(with_kinematics(load_robot("ur5"), kinematics), load_robot("ur5")) < 3e-3
 
 
 def test_what_is_exported_is_read_again(tmp_path: Path) -> None:
-    arm = made(tmp_path, ur.UR10_CONF, "ur10")
+    arm = arm_of(tmp_path, ur.UR10_CONF, "ur10")
     export = exported(arm, "ur-kinematics")
     again = with_kinematics(load_robot("ur10"), read_kinematics(written(tmp_path, export.text, "ros.yaml")))
-    for one, other in zip(again.world_poses(JOINTS), arm.world_poses(JOINTS), strict=True):
-        assert_allclose(one, other, rtol=0, atol=1e-12)
+    for first, other in zip(again.world_poses(JOINTS), arm.world_poses(JOINTS), strict=True):
+        assert_allclose(first, other, rtol=0, atol=1e-12)
     assert "hash: truearm_" in export.text
     assert "0x6e0f7bf" not in export.text
     assert any("cannot hold masses" in line for line in export.left_out)
@@ -133,9 +133,9 @@ def test_frames_in_an_exported_file_are_those_of_urdf() -> None:
 
 def test_a_tilted_flange_is_said_to_be_left_out() -> None:
     arm = load_robot("ur5e").with_values({"alpha_6": 0.002, "a_6": 1e-3, "base_x": 1.0})
-    said = " ".join(exported(arm, "ur-kinematics").left_out)
-    assert "cannot hold a flange beside the last axis; left out: 1 mm and 0.1146 deg" in said
-    assert "base_x" in said
+    message = " ".join(exported(arm, "ur-kinematics").left_out)
+    assert "cannot hold a flange beside the last axis; left out: 1 mm and 0.1146 deg" in message
+    assert "base_x" in message
 
 
 @pytest.mark.parametrize(
@@ -156,13 +156,13 @@ def test_a_tilted_flange_is_said_to_be_left_out() -> None:
 def test_a_damaged_file_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
     text = re.sub(old, new, ur.UR10_CONF, count=1)
     assert text != ur.UR10_CONF
-    with refused(said):
+    with refusing(said):
         read_kinematics(written(tmp_path, text))
 
 
 def test_a_damaged_file_of_the_ros_driver_is_refused(tmp_path: Path) -> None:
     for old, new in (("wrist_3", "wrist_4"), ("hash", "hush"), ("yaw: 1.5413963267648517e-05", "yaw: east")):
-        with refused("ros.yaml, kinematics", of=new):
+        with refusing("ros.yaml, kinematics", of=new):
             read_kinematics(written(tmp_path, ROS.replace(old, new), "ros.yaml"))
     # As a copy that broke off in its last number leaves it.
     rows = re.findall(r"  (\w+): \{([^}]*)\}", ROS)
@@ -170,7 +170,7 @@ def test_a_damaged_file_of_the_ros_driver_is_refused(tmp_path: Path) -> None:
     broken = re.sub(r"yaw: -3\.1\d+\n$", "yaw: -3.1", "kinematics:\n" + "".join(lines))
     assert broken.endswith("yaw: -3.1")
     for text in (ROS.partition("  hash")[0], ROS.partition("  hash")[0] + "  hash: ''\n", broken):
-        with refused("ros.yaml, kinematics: the hash is missing, so the file is not whole", of=text[-30:]):
+        with refusing("ros.yaml, kinematics: the hash is missing, so the file is not whole", of=text[-30:]):
             read_kinematics(written(tmp_path, text, "ros.yaml"))
 
 
@@ -178,26 +178,26 @@ def test_what_is_no_kinematics_file_is_refused_and_a_file_of_blanks_at_once(tmp_
     # Of so many blank lines each was once read again from every one before it, which would take ten minutes.
     blanks = ("\n" * 300_000 + "x: 1\n", "delta_" + "a" * 300_000, "delta_a" + " " * 300_000 + "b")
     for text in ("a,b,c\n1,2,3\n", "truearm: truearm-robot/1\nname: x\n", *blanks):
-        with refused("some.yaml", of=text[:20]):
+        with refusing("some.yaml", of=text[:20]):
             read_kinematics(written(tmp_path, text, "some.yaml"))
 
 
 def test_blanks_before_a_list_are_read(tmp_path: Path) -> None:
     text = ur.UR10_CONF.replace("[mounting]\n", "\n\n").replace("delta_", "\t  delta_")
-    found = read_kinematics(written(tmp_path, text))
-    assert found.deltas == read_kinematics(written(tmp_path, ur.UR10_CONF)).deltas
+    kinematics = read_kinematics(written(tmp_path, text))
+    assert kinematics.deltas == read_kinematics(written(tmp_path, ur.UR10_CONF)).deltas
 
 
 def test_a_flange_that_is_turned_far_is_refused(tmp_path: Path) -> None:
     type_ = load_robot("ur10")
     theta, a, d, alpha = ur.deltas(ur.UR10_CONF)
     zeros = (theta + np.array([0, 0, 0, 0, 0, angle]) for angle in (0.0, 0.09))  # of joint 6, which moves no flange
-    plain, turned = (made(tmp_path, ur.conf_of(zero, a, d, alpha), "ur10") for zero in zeros)
+    plain, turned = (arm_of(tmp_path, ur.conf_of(zero, a, d, alpha), "ur10") for zero in zeros)
     assert mean_distance(turned, type_) == pytest.approx(mean_distance(plain, type_))
     assert np.degrees(mean_angle(plain, type_)) == pytest.approx(0.362, abs=1e-3)
     assert np.degrees(mean_angle(turned, type_)) == pytest.approx(np.degrees(0.09), abs=0.1)
     refuse_far(plain, type_, "calibration.conf")
-    with refused("a flange turned by 5.18 deg from that of ur10 on average", "allowed: 1 deg"):
+    with refusing("a flange turned by 5.18 deg from that of ur10 on average", "allowed: 1 deg"):
         refuse_far(turned, type_, "calibration.conf")
 
 
@@ -207,7 +207,7 @@ def test_joint_zeros_that_cancel_at_the_flange_are_refused_at_the_link() -> None
     arm = type_.with_values({"theta_offset_2": 0.045, "theta_offset_3": -0.045})
     assert mean_angle(arm, type_) < 1e-6
     assert mean_distance(arm, type_) < 0.02
-    with refused("does not come to lie beside the nominal one", "2.58 deg", "allowed: 50 mm, 2 deg", "link 2"):
+    with refusing("does not come to lie beside the nominal one", "2.58 deg", "allowed: 50 mm, 2 deg", "link 2"):
         refuse_far(arm, type_, "calibration.conf")
 
 
@@ -218,12 +218,12 @@ def test_a_base_aside_of_the_first_axis_is_refused(tmp_path: Path) -> None:
 
 
 def test_differences_are_not_added_to_a_table_that_is_measured_already(tmp_path: Path) -> None:
-    found = read_kinematics(written(tmp_path, ur.UR10_CONF))
+    kinematics = read_kinematics(written(tmp_path, ur.UR10_CONF))
     text = robot_text(load_robot("ur10"))
     tilted = read_robot(written(tmp_path, text.replace("beta: 0.0", "beta: 0.1"), "tilted.yaml"))
     assert tilted.joints != load_robot("ur10").joints
     with pytest.raises(InputError, match="differences to the table of a type"):
-        with_kinematics(tilted, found)
+        with_kinematics(tilted, kinematics)
 
 
 def test_a_frame_far_from_the_types_is_refused(tmp_path: Path) -> None:
@@ -238,20 +238,20 @@ def test_a_frame_far_from_the_types_is_refused(tmp_path: Path) -> None:
     )
     odd = read_robot(written(tmp_path, text, "odd.yaml"))
     assert_allclose(odd.world_poses(JOINTS)[0], load_robot("ur10").world_poses(JOINTS)[0], atol=1e-9)
-    text = exported(made(tmp_path, ur.UR10_CONF, "ur10"), "ur-kinematics").text
+    text = exported(arm_of(tmp_path, ur.UR10_CONF, "ur10"), "ur-kinematics").text
     arm = with_kinematics(odd, read_kinematics(written(tmp_path, text, "ros.yaml")))
     with pytest.raises(InputError, match="does not come to lie beside the nominal one"):
         refuse_far(arm, odd, "ros.yaml")
 
 
 def test_a_robot_file_holds_what_the_controller_computes_with(tmp_path: Path) -> None:
-    arm = made(tmp_path, ur.UR10_CONF, "ur10")
+    arm = arm_of(tmp_path, ur.UR10_CONF, "ur10")
     again = read_robot(written(tmp_path, robot_text(arm), "arm.yaml"))
     assert robot_text(again) == robot_text(arm)
     assert again.controller.kinematics.kind == "own"
     assert again.controller.kinematics.identity["joint_checksum"].startswith("0x6e0f7bf, ")
-    for one, other in zip(controller_robot(again).world_poses(JOINTS), arm.world_poses(JOINTS), strict=True):
-        assert_allclose(one, other, rtol=0, atol=1e-12)
+    for first, other in zip(controller_robot(again).world_poses(JOINTS), arm.world_poses(JOINTS), strict=True):
+        assert_allclose(first, other, rtol=0, atol=1e-12)
 
 
 def test_a_robot_file_says_it_in_a_word_and_where_that_is_known_from(tmp_path: Path) -> None:
@@ -295,8 +295,8 @@ def test_kinematics_that_nobody_can_read_are_refused(entry: str, said: str, tmp_
 
 def test_rows_of_another_arm_in_a_robot_file_are_refused(tmp_path: Path) -> None:
     yaml = YAML(typ="safe")
-    text = robot_text(made(tmp_path, ur.UR10_CONF, "ur10"))
-    for row, column, wrong, said in (
+    text = robot_text(arm_of(tmp_path, ur.UR10_CONF, "ur10"))
+    for row, column, wrong, words in (
         (1, "a", 60.0, "another type of robot"),
         (5, "theta_offset", 5.0, "no arm of this type"),
         (1, "beta", 30.0, "another type of robot"),
@@ -306,7 +306,7 @@ def test_rows_of_another_arm_in_a_robot_file_are_refused(tmp_path: Path) -> None
         rows[row][column] = rows[row].get(column, 0.0) + wrong
         with (tmp_path / "arm.yaml").open("w") as stream:
             yaml.dump(content, stream)
-        with refused("arm.yaml, controller.kinematics: ", said, of=column):
+        with refusing("arm.yaml, controller.kinematics: ", words, of=column):
             read_robot(tmp_path / "arm.yaml")
 
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_chain import random_robot
+from tests.expecting import refusing
 
 from truearm.engine.robot.chain import Array, Chain
 from truearm.engine.robot.conventions import CONVENTIONS
@@ -183,8 +183,8 @@ class Pinocchio:
 def check_poses(robot: Robot, content: bytes | str, link: str, atol: float, seed: int = 0) -> None:
     """Check that Pinocchio finds the poses of `robot` in the file; its base stands at the identity."""
     q = robot.random_configurations(10, np.random.default_rng(seed))
-    found = Pinocchio(content).poses([joint.name for joint in robot.joints], q, link)
-    for actual, expected in zip(found, robot.world_poses(q), strict=True):
+    result = Pinocchio(content).poses([joint.name for joint in robot.joints], q, link)
+    for actual, expected in zip(result, robot.world_poses(q), strict=True):
         assert_allclose(actual, expected, rtol=0, atol=atol)
 
 
@@ -366,14 +366,14 @@ REFUSED: list[tuple[bytes, tuple[str, ...]]] = [
 
 def test_file_is_refused(tmp_path: Path) -> None:
     for content, parts in REFUSED:
-        with refused(str(tmp_path), *parts, of=parts):
+        with refusing(str(tmp_path), *parts, of=parts):
             read(content, tmp_path)
     for tip, parts in (("tool", ("no link of this name", "'tool'")), ("world", ("no joint moves", "root world"))):
-        with refused("robot.urdf", *parts, of=tip):
+        with refusing("robot.urdf", *parts, of=tip):
             read(UR_LIKE, tmp_path, tip)
-    with refused("'my robot' and 'cell 3'", "Rename the file"):
+    with refusing("'my robot' and 'cell 3'", "Rename the file"):
         read_urdf(written(simple(ARM, links=AB, name="my robot"), tmp_path, "cell 3.urdf"))
-    with refused("no such file"):
+    with refusing("no such file"):
         read_urdf(tmp_path / "none.urdf")
 
 
@@ -448,8 +448,8 @@ def test_right_angle_stays_a_right_angle(tmp_path: Path) -> None:
     for pitch in (math.pi / 2, -math.pi / 2):
         inside = f'<origin xyz="0 0 0" rpy="0.25 {pitch!r} 0.5"/><axis xyz="1 0 0"/>'
         after = edited(inside, {"theta_offset_1": 0.125}, tmp_path)
-        found = re.findall(r'rpy="(\S+) (\S+) (\S+)"', after)[0]
-        assert_allclose([float(v) for v in found], [0.375, pitch, 0.5], rtol=0, atol=1e-15)
+        match = re.findall(r'rpy="(\S+) (\S+) (\S+)"', after)[0]
+        assert_allclose([float(v) for v in match], [0.375, pitch, 0.5], rtol=0, atol=1e-15)
 
 
 def test_byte_places_hold_in_long_files_and_behind_a_mark(tmp_path: Path) -> None:
@@ -478,7 +478,7 @@ def test_what_a_urdf_cannot_hold_is_said(tmp_path: Path) -> None:
 def test_another_robots_file_is_not_calibrated(tmp_path: Path) -> None:
     robot = read(UR_LIKE, tmp_path)
     slides = UR_LIKE.replace(b'"elbow_joint" type="revolute"', b'"elbow_joint" type="prismatic"')
-    for content, said in (
+    for content, words in (
         (simple(ARM, links=AB), "no joint wrist_1_joint"),
         (UR_LIKE.replace(b'"elbow_joint"', b'"elbow"'), "other joints move"),
         (UR_LIKE.replace(b"0.39225", b"0.39226"), "z of joint wrist_1_joint differs"),
@@ -486,9 +486,9 @@ def test_another_robots_file_is_not_calibrated(tmp_path: Path) -> None:
         (UR_LIKE.replace(b'"0 0 1"/>', b'"0 0 -1"/>', 1), "axis_z of joint shoulder_pan_joint differs"),
         (slides, "joint elbow_joint is prismatic"),
     ):
-        with refused("not the one this robot was read from", said, of=said):
+        with refusing("not the one this robot was read from", words, of=words):
             calibrated_urdf(content, robot)
-    with refused("irb120 is of convention modified-hayati", "a new URDF can be written"):
+    with refusing("irb120 is of convention modified-hayati", "a new URDF can be written"):
         calibrated_urdf(UR_LIKE, load_robot("irb120"))
 
 
@@ -612,7 +612,7 @@ def test_velocities_of_limits_are_the_speeds_of_the_joints_and_what_is_not_known
     robot = load_robot("irb120")
     free = replace(robot, joints=(replace(robot.joints[0], limits=None), *robot.joints[1:]))
     path = tmp_path / "arm.urdf"
-    for made, said in (
+    for result, words in (
         (with_speeds(robot), "Effort and velocity limits are not known and stand as 0."),
         (free, "Effort limits are not known and stand as 0."),
         (
@@ -620,15 +620,17 @@ def test_velocities_of_limits_are_the_speeds_of_the_joints_and_what_is_not_known
             "Effort limits, and velocity limits of axis_2, axis_6, are not known and stand as 0.",
         ),
     ):
-        text, left_out = urdf_text(made)
-        assert left_out == [said, "Inertia tensors are not written and stand as 0."]
+        text, left_out = urdf_text(result)
+        assert left_out == [words, "Inertia tensors are not written and stand as 0."]
         path.write_text(text)
         again = read_urdf(path)
         assert [(joint.limits, joint.max_speed) for joint in again.joints] == [
-            (joint.limits, joint.max_speed) for joint in made.joints
+            (joint.limits, joint.max_speed) for joint in result.joints
         ]
         saved = robot_from_file(RobotFile(**YAML(typ="safe").load(robot_text(again))), "again")
-        assert [joint.max_speed for joint in saved.joints] == pytest.approx([joint.max_speed for joint in made.joints])
+        assert [joint.max_speed for joint in saved.joints] == pytest.approx(
+            [joint.max_speed for joint in result.joints]
+        )
 
 
 def with_speeds(robot: Robot, *speeds: float | None) -> Robot:
@@ -658,5 +660,5 @@ def test_new_file_is_refused() -> None:
         ((Joint("A", "revolute", {}), Joint("A", "revolute", {})), ("two joints of one name", "'A'")),
         ((Joint("tool0_joint", "revolute", {}),), ("two joints of one name", "'tool0_joint'")),
     ):
-        with refused(*parts, of=parts):
+        with refusing(*parts, of=parts):
             urdf_text(Robot("arm", "", "", "standard-dh", joints))

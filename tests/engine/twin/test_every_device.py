@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
@@ -65,21 +65,22 @@ def residuals(twin: Twin, data: Dataset) -> Array:
     tips = np.array([frames[data.targets[t]][c, :3, 3] for c, t in zip(data.configuration, data.target, strict=True)])
     off = []
     for index in np.unique(data.against).tolist():
-        mine = data.against == index
-        at, read = tips[mine], data.position[mine]
+        of_fixture = data.against == index
+        at, read = tips[of_fixture], data.position[of_fixture]
         if data.height is not None:
             Vt = np.linalg.svd(at - at.mean(axis=0))[2]
-            off.append((at - at.mean(axis=0)) @ Vt[2] - data.height[mine])
+            off.append((at - at.mean(axis=0)) @ Vt[2] - data.height[of_fixture])
         elif data.distance is not None:
             rows = np.column_stack([2 * (at - at.mean(axis=0)), np.ones(len(at))])
-            right = ((at - at.mean(axis=0)) ** 2).sum(axis=1) - data.distance[mine] ** 2
+            right = ((at - at.mean(axis=0)) ** 2).sum(axis=1) - data.distance[of_fixture] ** 2
             centre = at.mean(axis=0) + np.linalg.lstsq(rows, right, rcond=None)[0][:3]
             for _ in range(5):
                 far = np.linalg.norm(at - centre, axis=1)
                 centre = (
-                    centre + np.linalg.lstsq((centre - at) / far[:, None], data.distance[mine] - far, rcond=None)[0]
+                    centre
+                    + np.linalg.lstsq((centre - at) / far[:, None], data.distance[of_fixture] - far, rcond=None)[0]
                 )
-            off.append(data.distance[mine] - np.linalg.norm(at - centre, axis=1))
+            off.append(data.distance[of_fixture] - np.linalg.norm(at - centre, axis=1))
         elif index < 0:
             off.append((read - at).ravel())
         else:
@@ -103,7 +104,7 @@ def test_names_are_unlike_and_every_device_says_what_it_is() -> None:
 
 
 def test_an_unknown_device_is_refused() -> None:
-    with refused("no device of this name; got 'balbar'; allowed: tracker, ", "mean ballbar"):
+    with refusing("no device of this name; got 'balbar'; allowed: tracker, ", "mean ballbar"):
         named_device("balbar")
 
 
@@ -135,9 +136,9 @@ def test_noise_is_what_is_declared(name: str) -> None:
     off = residuals(twin, data)
     # places of fixtures, found from the readings, take some of the noise: six numbers of each at most
     spent = 6.0 * len(data.fixtures)
-    found = np.sqrt(np.sum(off**2) / (len(off) - spent))
+    values = np.sqrt(np.sum(off**2) / (len(off) - spent))
     # nine coordinates of a hexapod's pose err together: they are declared to weigh no more than its six lengths
-    assert found == pytest.approx(device.sigma * (0.75 if name == "hexapod" else 1.0), rel=0.35)
+    assert values == pytest.approx(device.sigma * (0.75 if name == "hexapod" else 1.0), rel=0.35)
     assert np.abs(off).max() < 6 * device.sigma
     assert (data.sigma_rot is None) == (data.quaternion is None)
 
@@ -173,8 +174,8 @@ def test_configurations_are_within_the_limits_and_all_are_read(name: str, robot:
 
 @every_device
 def test_the_same_seed_reads_the_same(name: str) -> None:
-    one, other, another = (_read_by.__wrapped__(name, "irb120", 6, None, seed)[1] for seed in (0, 0, 1))
-    assert csv_text(one) == csv_text(other) != csv_text(another)
+    first, other, another = (_read_by.__wrapped__(name, "irb120", 6, None, seed)[1] for seed in (0, 0, 1))
+    assert csv_text(first) == csv_text(other) != csv_text(another)
 
 
 @every_device
@@ -301,10 +302,10 @@ def test_an_arm_that_bends_is_identified_from_its_own_loops(name: str) -> None:
     laden = nominal("irb120").with_payload(drawn.payload)
     fits = [identify(laden, training, model) for model in (ELASTIC, GEOMETRIC)]
     elastic, rigid = (errors_of(fit.robot, held_out) for fit in fits)
-    found = np.concatenate([elastic.position_norms, elastic.length_norms]).max()
+    values = np.concatenate([elastic.position_norms, elastic.length_norms]).max()
     # the joints' tilts and the loads follow each other to a thousandth of the sag
-    assert found < 1e-5
-    assert found < 0.05 * np.concatenate([rigid.position_norms, rigid.length_norms]).max()
+    assert values < 1e-5
+    assert values < 0.05 * np.concatenate([rigid.position_norms, rigid.length_norms]).max()
 
 
 #: Of what is out of its reach few readings are asked for: three times as many places are tried one after the other.
@@ -344,11 +345,11 @@ def covered(name: str) -> tuple[int, int]:
 
 def test_stated_intervals_hold_the_truth_as_often_as_they_say() -> None:
     """Over all devices: 300 parameters of 19 robots; those of one robot go together, so 4 % either way is chance."""
-    found = {name: covered(name) for name in NAMES}
-    for name, (within, counted) in found.items():
+    coverage = {name: covered(name) for name in NAMES}
+    for name, (within, counted) in coverage.items():
         assert counted > 12, name
         assert within >= 0.75 * counted, name
-    within, counted = np.sum(list(found.values()), axis=0).tolist()
+    within, counted = np.sum(list(coverage.values()), axis=0).tolist()
     assert counted > 230
     assert 0.91 <= within / counted <= 0.99
 
@@ -375,14 +376,14 @@ def cramped(robot: Robot) -> Robot:
 def test_arms_out_of_reach_or_too_far_from_the_nominal_robot_are_refused() -> None:
     twin = truth_twin(nominal("irb120"), "nominal", np.random.default_rng(0))
     far = replace(twin, robot=twin.robot.with_frames(Transform((9.0, 0.0, 0.0)), {}))
-    with refused("measurement-arm sees too few configurations of irb120", "got '0 among"):
+    with refusing("measurement-arm sees too few configurations of irb120", "got '0 among"):
         measured_with(named_device("measurement-arm"), nominal("irb120"), far, 5, np.random.default_rng(0))
     for name in ("ballbar", "gauges", "plane", "two-spheres"):
-        with refused(f"{name}: irb120 does not reach ", " of 9 places within reach'; allowed: 3 or"):
+        with refusing(f"{name}: irb120 does not reach ", " of 9 places within reach'; allowed: 3 or"):
             measured_with(named_device(name), cramped(nominal("irb120")), twin, 3, np.random.default_rng(0))
     short = replace(twin, robot=twin.robot.with_values({"a_2": 0.02, "d_4": 0.02}))
     for name in ("ballbar", "gauges", "point", "touch-up"):
-        with refused("irb120: the tool ", "place of measurement", "too far from", of=name):
+        with refusing("irb120: the tool ", "place of measurement", "too far from", of=name):
             measured_with(named_device(name), nominal("irb120"), short, 10, np.random.default_rng(0))
 
 
@@ -391,16 +392,16 @@ def test_an_arm_that_turns_its_back_is_refused() -> None:
     rng = np.random.default_rng(0)
     twin = truth_twin(nominal("irb120"), "nominal", rng)
     for name in ("tracker", "optical-cmm-planar", "markers"):
-        said = []
+        messages = []
         for turn in (0.0, np.pi / 2):
             base = Transform((2.0, 0.5, 0.0), (float(np.cos(turn)), 0.0, 0.0, float(np.sin(turn))))
             turned = replace(twin, robot=twin.robot.with_frames(base, {"1": (0.0, 0.0, 0.1)}))
             try:
                 measured_with(named_device(name), cramped(nominal("irb120")), turned, 5, rng)
             except InputError as refusal:
-                said.append(str(refusal))
-        assert said, name
-        assert all(f"{name} sees too few configurations of irb120" in text for text in said)
+                messages.append(str(refusal))
+        assert messages, name
+        assert all(f"{name} sees too few configurations of irb120" in text for text in messages)
 
 
 def test_every_plate_is_touched_often_enough_to_be_found_again() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from papers.katana.robot import katana, published
 from truearm.engine.base.errors import InputError
@@ -85,8 +85,8 @@ def test_any_arm_touches_though_it_errs_sags_and_plays(name: str) -> None:
     )
     data = table.tilted(ROLL, -PITCH).touched_by(twin, start, 0.0, rng)
     assert data.approach is not None
-    there = tips(twin, data.joints, data.approach)
-    np.testing.assert_allclose(there, table.tilted(ROLL, -PITCH).in_world, atol=2e-10)
+    touched = tips(twin, data.joints, data.approach)
+    np.testing.assert_allclose(touched, table.tilted(ROLL, -PITCH).in_world, atol=2e-10)
     np.testing.assert_array_equal(data.position, table.points)
     assert data.sigma is None
 
@@ -98,8 +98,8 @@ def test_play_lies_as_the_order_of_points_says_or_as_told() -> None:
     perfect = table.touched_by(Twin(arm()), ELBOW_UP, 0.0, rng).joints
     in_order = table.touched_by(twin, ELBOW_UP, 0.0, rng)
     np.testing.assert_allclose(in_order.joints, perfect - play * directions(perfect), atol=1e-8)
-    told = table.touched_by(twin, ELBOW_UP, 0.0, rng, approach=np.ones(perfect.shape))
-    np.testing.assert_allclose(told.joints, perfect - play, atol=1e-8)
+    stated = table.touched_by(twin, ELBOW_UP, 0.0, rng, approach=np.ones(perfect.shape))
+    np.testing.assert_allclose(stated.joints, perfect - play, atol=1e-8)
 
 
 def test_noise_is_where_the_tip_is_and_is_declared() -> None:
@@ -122,30 +122,30 @@ def test_roll_and_pitch_against_the_robot_are_base_parameters() -> None:
 
 def test_points_out_of_reach_or_beyond_limits_are_named() -> None:
     points, rng = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]), np.random.default_rng(0)
-    with refused("point 2: the tip does not come to rest", "mm away"):
+    with refusing("point 2: the tip does not come to rest", "mm away"):
         CalibrationTable(points, PLACE).touched_by(Twin(arm()), ELBOW_UP, 0.0, rng)
     behind = CalibrationTable(np.array([[-0.55, -0.12, 0.1]]), PLACE)
-    with refused("point 1: a joint would leave its limits", "joint_1 at", "-120 to 120 deg"):
+    with refusing("point 1: a joint would leave its limits", "joint_1 at", "-120 to 120 deg"):
         behind.touched_by(Twin(arm()), np.radians((-150.0, 60.0, -90.0)), 0.0, rng)
 
 
 def test_a_roll_beyond_the_ball_joint_is_refused_and_a_pitch_is_not() -> None:
     table = CalibrationTable(GRID, PLACE)
     for roll in (math.radians(25.0), math.nan):
-        with refused("rolled so far", "-20 to 20 deg"):
+        with refusing("rolled so far", "-20 to 20 deg"):
             table.tilted(roll, 0.0)
     assert table.tilted(0.0, math.radians(60.0)).place != table.place
 
 
 def test_points_grids_and_targets_that_are_none_are_refused() -> None:
     for points in (np.zeros((0, 3)), np.zeros((4, 2)), np.array([[0.0, math.nan, 0.0]])):
-        with refused("calibration table", of=points):
+        with refusing("calibration table", of=points):
             CalibrationTable(points)
     for columns, rows, spacing in ((0, 3, 0.01), (3, 0, 0.01), (3, 3, 0.0), (3, 3, math.nan)):
-        with refused("a grid needs columns, rows and space", of=(columns, rows, spacing)):
+        with refusing("a grid needs columns, rows and space", of=(columns, rows, spacing)):
             rectangular_grid(columns, rows, spacing)
     twin = Twin(arm().with_frames(IDENTITY, {"1": (0.0, 0.0, 0.0), "2": (0.0, 0.0, 0.1)}))
-    with refused("one target touches the table", "2 targets"):
+    with refusing("one target touches the table", "2 targets"):
         CalibrationTable(GRID, PLACE).touched_by(twin, ELBOW_UP, 0.0, np.random.default_rng(0))
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.arms import ARMS
-from tests.engine.robot.refusing import refused
 from tests.engine.robot.test_loads import by_pinocchio, motion, random_link, random_triple
+from tests.expecting import refusing
 
 from truearm.engine.data import inclinations as inclinometer
 from truearm.engine.robot.chain import Array
@@ -196,8 +196,8 @@ def test_the_direction_of_approach_is_that_of_the_last_move() -> None:
     q = np.array([[0.1, 0.0], [0.2, 0.0], [0.2, -0.3], [0.1, -0.1]])
     assert_allclose(directions(q), [[0, 0], [1, 0], [1, -1], [-1, 1]])
     twin = Twin(planar(0.5, 0.4), {1: JointTruth(hysteresis=1e-4), 2: JointTruth(hysteresis=-2e-4)})
-    found = np.array([posture.deflection[:, 2] for posture in twin.postures(q)])
-    assert_allclose(found, directions(q) * [1e-4, -2e-4])
+    deflections = np.array([posture.deflection[:, 2] for posture in twin.postures(q)])
+    assert_allclose(deflections, directions(q) * [1e-4, -2e-4])
     asked = twin.postures(q, approach=-np.ones((4, 2)))
     assert_allclose([posture.deflection[:, 2] for posture in asked], [[-1e-4, 2e-4]] * 4)
 
@@ -253,7 +253,7 @@ CLEARANCE = (0.022, 0.024, 0.017, 0.015, 0.018)  # Table 4.3 [deg]
 def katana_on_the_circle() -> tuple[Robot, Array]:
     """Return the arm with the pencil and joints on the circle of section 5.5.1, each point from the same posture."""
     robot = load_robot("katana450").with_frames(Transform(), {"tip": (0.0, 0.0, 0.130)})
-    centre, found = np.array([0.0, -0.3, 0.1392893]), []
+    centre, postures = np.array([0.0, -0.3, 0.1392893]), []
     for angle in np.linspace(0, 2 * math.pi, 24, endpoint=False):
         up, across = 0.1 * math.cos(angle) * math.sqrt(0.5), 0.1 * math.sin(angle)
         point, q = centre + np.array([across, -up, up]), np.radians([0.0, 30.0, 60.0, 60.0, 0.0])
@@ -265,8 +265,8 @@ def katana_on_the_circle() -> tuple[Robot, Array]:
             q = q + step * min(1.0, 0.2 / float(np.abs(step).max()))
         else:
             raise AssertionError("a point of the circle cannot be reached")
-        found.append(q)
-    return robot, np.array(found)
+        postures.append(q)
+    return robot, np.array(postures)
 
 
 def test_the_katana_on_its_circle_is_as_far_off_as_the_document_measured() -> None:
@@ -306,13 +306,13 @@ def test_a_truth_carries_the_tool_unless_the_robot_carries_something() -> None:
 
 def test_joints_and_shapes_that_are_not_there_are_refused() -> None:
     for number in (0, 3):
-        with refused(f"joint {number} of the twin of planar: the robot has no such", "1 to 2"):
+        with refusing(f"joint {number} of the twin of planar: the robot has no such", "1 to 2"):
             Twin(planar(0.5, 0.4), {number: JointTruth()})
     twin = Twin(planar(0.5, 0.4))
     for name in ("approach", "temperature", "wrench", "velocity", "acceleration"):
-        with refused(name, "shape (2, 7)"):
+        with refusing(name, "shape (2, 7)"):
             measure(twin, np.zeros((3, 2)), 0.0, RNG(0), **{name: np.zeros((2, 7))})  # type: ignore[arg-type]
-    with refused("joint positions; got 'an array of shape (3, 1)'; allowed: (3, 2)"):
+    with refusing("joint positions; got 'an array of shape (3, 1)'; allowed: (3, 2)"):
         measure(twin, np.zeros((3, 1)), 0.0, RNG(0))
 
 
@@ -322,7 +322,7 @@ def test_only_joints_about_z_tilt() -> None:
     row = {"axis_x": 0.0, "axis_y": 1.0, "axis_z": 0.0}
     about_y = Robot("arm", "", "", "urdf", (Joint("J1", "revolute", row),))
     for robot in (slide, about_y):
-        with refused("only a joint that turns about its frame's z can tilt", of=robot.name):
+        with refusing("only a joint that turns about its frame's z can tilt", of=robot.name):
             Twin(robot, loose)
     about_z = replace(about_y, joints=(Joint("J1", "revolute", {**row, "axis_y": 0.0, "axis_z": 1.0}),))
     assert Twin(about_z, loose).joints == loose
@@ -380,7 +380,7 @@ def test_the_twin_computes_every_effect_and_refuses_another(monkeypatch: pytest.
             return (self.parameter("wobble_1", "rad", 1e-3),)
 
     monkeypatch.setattr("truearm.engine.robot.robot_data.EFFECTS", (Wobble,))
-    with refused("does not compute this joint effect; got 'wobble_1'"):
+    with refusing("does not compute this joint effect; got 'wobble_1'"):
         joint_truths(replace(load_robot("irb120"), effect_names=("wobble",)))
 
 
@@ -414,10 +414,10 @@ def test_a_configuration_stands_alone_as_it_does_among_others() -> None:
 def test_more_configurations_than_are_followed_at_a_time() -> None:
     twin = Twin(load_robot("li3"))
     joints = twin.robot.random_configurations(1030, np.random.default_rng(0))
-    found = np.array([posture.links for posture in twin.postures(joints)])
+    links = np.array([posture.links for posture in twin.postures(joints)])
     one_by_one = np.array([twin.postures(joints[[row]])[0].links for row in (0, 511, 512, 1023, 1024, 1029)])
-    assert_allclose(found[[0, 511, 512, 1023, 1024, 1029]], one_by_one, rtol=1e-13, atol=1e-15)
-    assert len(found) == 1030
+    assert_allclose(links[[0, 511, 512, 1023, 1024, 1029]], one_by_one, rtol=1e-13, atol=1e-15)
+    assert len(links) == 1030
 
 
 # -- truths whose encoders and gears err: their amplitudes are those stated, and they go a way of their own
@@ -427,8 +427,8 @@ TURN = np.linspace(-math.pi, math.pi, 7200, endpoint=False)
 
 def curve(joint: JointTruth) -> np.ndarray:
     """Return what a joint turns beyond its position over a turn, 20 places a degree [deg]."""
-    rest = np.zeros(len(TURN))
-    return np.degrees(joint.turn(TURN, rest, rest))
+    remaining = np.zeros(len(TURN))
+    return np.degrees(joint.turn(TURN, remaining, remaining))
 
 
 def strengths(joint: JointTruth) -> np.ndarray:
@@ -443,12 +443,12 @@ def geared(truth: str, seed: int = 0, robot: str = "irb120") -> Twin:
 def test_gears_err_as_often_and_as_much_as_stated() -> None:
     drawn = geared("gear-errors")
     for number in range(1, 7):
-        found = strengths(drawn.joints[number])
-        often = np.flatnonzero(found > 1e-9)
+        result = strengths(drawn.joints[number])
+        often = np.flatnonzero(result > 1e-9)
         assert len(often) == 5
         assert often[:2].tolist() == [1, 2]
         assert ((often[2:] >= 10) & (often[2:] <= 60)).all()
-        assert found[often] == pytest.approx([0.010, 0.004, 0.006, 0.006, 0.006])
+        assert result[often] == pytest.approx([0.010, 0.004, 0.006, 0.006, 0.006])
         assert curve(drawn.joints[number]).std() == pytest.approx(0.0106, abs=1e-4)
     periods = {tuple(k for k, _, _ in joint.gear) for joint in drawn.joints.values()}
     assert len(periods) == 6  # no joint like another
@@ -456,9 +456,9 @@ def test_gears_err_as_often_and_as_much_as_stated() -> None:
 
 def test_teeth_and_worn_places_are_no_series_that_ends() -> None:
     for joint in geared("tooth-errors").joints.values():
-        found = strengths(joint)
+        result = strengths(joint)
         assert 0.009 < curve(joint).std() < 0.016
-        assert np.sqrt((found[61:] ** 2).sum() / 2) > 1e-4  # some is beyond 60 periods
+        assert np.sqrt((result[61:] ** 2).sum() / 2) > 1e-4  # some is beyond 60 periods
 
 
 def test_a_triangle_is_straight_between_its_ends() -> None:

@@ -18,7 +18,7 @@ LARGEST: Final = accepted_range("1")[1]
 
 
 def number_array(
-    given: object,
+    value: object,
     parameter: str,
     shape: tuple[int | str, ...],
     *,
@@ -36,17 +36,17 @@ def number_array(
     """
     allowed = allowed or f"numbers, {shape_text(shape)}"
     try:
-        values = _without_mask(given)
+        values = _without_mask(value)
     except (ValueError, TypeError):
         raise InputError("the rows are not of one length", parameter=parameter, allowed=allowed) from None
     if values.dtype.kind not in "iuf":
-        raise wrong_kind("numbers belong here", given, parameter, allowed)
+        raise wrong_kind("numbers belong here", value, parameter, allowed)
     if isinstance(values, np.ma.MaskedArray):
         if not missing:
             raise InputError("masked numbers cannot be used here", parameter=parameter, allowed=allowed)
         values = np.ma.filled(values.astype(float), np.nan)
     fits = values.ndim == len(shape) and all(
-        isinstance(length, str) or length == there for length, there in zip(shape, values.shape, strict=True)
+        isinstance(length, str) or length == size for length, size in zip(shape, values.shape, strict=True)
     )
     if not fits:
         raise InputError(
@@ -74,19 +74,19 @@ def number_array(
     return numbers
 
 
-def _without_mask(given: object) -> NDArray[np.generic]:
+def _without_mask(value: object) -> NDArray[np.generic]:
     """Return an array, without its mask if that hides nothing."""
-    rows = given if isinstance(given, list | tuple) else [given]
+    rows = value if isinstance(value, list | tuple) else [value]
     if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
-        return np.asarray(given)
-    masked: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.generic]] = np.ma.array(given)
+        return np.asarray(value)
+    masked: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.generic]] = np.ma.array(value)
     return masked if np.ma.is_masked(masked) else np.asarray(masked.data)
 
 
-def axes(given: object) -> int:
+def axes(value: object) -> int:
     """Return how many axes an array has, 0 of a number and -1 of what is no array."""
     try:
-        return int(np.ndim(given))  # type: ignore[arg-type]
+        return int(np.ndim(value))  # type: ignore[arg-type]
     except (TypeError, ValueError):  # such as rows of different lengths
         return -1
 

@@ -46,7 +46,7 @@ def shortened(text: str, longest: int) -> str:
 
 def with_short_words(text: str) -> str:
     """Return a text in which very long words, such as a name of 5000 characters, have lost their middle."""
-    return _LONG_WORD.sub(lambda found: shortened(found[0], LONGEST_WORD), text)
+    return _LONG_WORD.sub(lambda match: shortened(match[0], LONGEST_WORD), text)
 
 
 def _steers(character: str) -> bool:
@@ -57,7 +57,7 @@ def _steers(character: str) -> bool:
 _NAMED: Final = re.compile(r"`(?P<name>[a-z][a-z_]*)(?:=(?P<value>[^`]*))?`")
 #: A part of a message of more characters is shortened, and what came much sooner.
 _LONGEST: Final = 1500
-_LONGEST_CAME: Final = 160
+_LONGEST_VALUE: Final = 160
 #: Names are compared with so many others at most: more take long and help nobody.
 _MOST_COMPARED: Final = 2000
 
@@ -120,8 +120,8 @@ def wrong_kind(what: str, came: object, parameter: str, allowed: str, *, where: 
         came = Words("None")
     elif not isinstance(came, str | bytes | int | float):
         size = f" of {len(came)}" if isinstance(came, Sized) and getattr(came, "ndim", None) != 0 else ""
-        held = f" that holds {came.dtype}" if hasattr(came, "dtype") else ""
-        came = Words(f"an object of type {kind_of(came)}{size}{held}")
+        content = f" that holds {came.dtype}" if hasattr(came, "dtype") else ""
+        came = Words(f"an object of type {kind_of(came)}{size}{content}")
     return InputError(what, parameter=parameter, where=where, came=came, allowed=allowed)
 
 
@@ -158,14 +158,14 @@ def refusals_at(where: str) -> Iterator[None]:
         raise
 
 
-def kind_of(came: object) -> str:
+def kind_of(value: object) -> str:
     """Return the name of an object's type, for messages."""
-    return type(came).__name__
+    return type(value).__name__
 
 
 def with_parameters(text: str, spelled: Callable[[str, str | None], str]) -> str:
     """Return a text in which every parameter named in backticks is as `spelled` writes it, with its value if any."""
-    return _NAMED.sub(lambda found: spelled(found["name"], found["value"]), text)
+    return _NAMED.sub(lambda match: spelled(match["name"], match["value"]), text)
 
 
 class Words(str):
@@ -174,12 +174,12 @@ class Words(str):
     __slots__ = ()
 
 
-def _shown(came: object) -> str:
-    if isinstance(came, Rational) and max(abs(int(came.numerator)), int(came.denominator)) >> 300:
+def _shown(value: object) -> str:
+    if isinstance(value, Rational) and max(abs(int(value.numerator)), int(value.denominator)) >> 300:
         return "a number of very many digits"  # Python may refuse to write it out
-    quoted = isinstance(came, str) and not isinstance(came, Words)
-    text = repr(shortened(str(came), _LONGEST_CAME)) if quoted else str(came)
-    return shortened(text, _LONGEST if isinstance(came, Words) else _LONGEST_CAME)
+    quoted = isinstance(value, str) and not isinstance(value, Words)
+    text = repr(shortened(str(value), _LONGEST_VALUE)) if quoted else str(value)
+    return shortened(text, _LONGEST if isinstance(value, Words) else _LONGEST_VALUE)
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
@@ -190,9 +190,9 @@ def nearest_names(name: str, known: Iterable[str], count: int = 3, likeness: flo
     """
     import difflib  # only where something is misspelt
 
-    if len(name) > _LONGEST_CAME:  # nobody misspells that, and to compare it takes long
+    if len(name) > _LONGEST_VALUE:  # nobody misspells that, and to compare it takes long
         return []
-    few = (candidate for candidate in islice(known, _MOST_COMPARED) if len(candidate) <= _LONGEST_CAME)
+    few = (candidate for candidate in islice(known, _MOST_COMPARED) if len(candidate) <= _LONGEST_VALUE)
     by_folded = {candidate.lower(): candidate for candidate in few}
     if name.lower() in by_folded:
         return [by_folded[name.lower()]]
@@ -255,9 +255,9 @@ class Rule:
         """Every level that it may have, the usual one first."""
         return self.level if isinstance(self.level, tuple) else (self.level,)
 
-    def __call__(self, said: str, level: Level | None = None, at: tuple[tuple[str, str], ...] = ()) -> Notice:
+    def __call__(self, text: str, level: Level | None = None, at: tuple[tuple[str, str], ...] = ()) -> Notice:
         """Return the notice: what was noticed, with figures and names, and the cure behind it."""
-        message = f"{said} {self.cure}" if self.cure else said
+        message = f"{text} {self.cure}" if self.cure else text
         return Notice(self.code, message, level or self.levels[0], at, self)
 
 

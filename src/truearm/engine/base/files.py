@@ -23,7 +23,7 @@ _BRACKET: Final = re.compile(r"[\[\]{}]")
 #: An entry that stands for another one, or what looks like it.
 _ALIAS: Final = re.compile(r"(?:^|[\s\[{,:])\*[^\s\[\]{},]")
 #: YAML texts up to this length are kept as they were parsed, in case they are read again.
-_KEPT_SIZE: Final = 200_000
+_CACHED_SIZE: Final = 200_000
 #: What is read but is no file, for messages. Whoever reads them may wait for ever, or never come to an end.
 _NO_FILES: Final = (
     (stat.S_ISFIFO, "a named pipe"),
@@ -88,7 +88,7 @@ def read_bytes(path: Path, most: str = "file_size") -> bytes:
             raise InputError(
                 "this is no file",
                 where=str(path),
-                came=next((kind for is_one, kind in _NO_FILES if is_one(state.st_mode)), None),
+                came=next((kind for is_kind, kind in _NO_FILES if is_kind(state.st_mode)), None),
                 allowed="a file on disk",
                 cure="Write what it yields into a file first.",
             )
@@ -193,7 +193,7 @@ def read_yaml(path: Path, schema: type[Model]) -> Model:
     try:
         if _ALIAS.search(text):
             _refuse_multiplied(YAML(typ="safe", pure=True).compose(text), path)
-        content = deepcopy(_loaded(text)) if len(text) <= _KEPT_SIZE else _loaded.__wrapped__(text)
+        content = deepcopy(_loaded(text)) if len(text) <= _CACHED_SIZE else _loaded.__wrapped__(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"{path}, line {mark.line + 1}" if mark else str(path)
@@ -223,8 +223,8 @@ def _loaded(text: str) -> Any:
 def _deepest(text: str) -> int:
     """Return how many brackets are open at once in a YAML document, those in quotes and comments included."""
     depth = deepest = 0
-    for found in _BRACKET.finditer(text):
-        depth = depth + 1 if found[0] in "[{" else max(depth - 1, 0)
+    for match in _BRACKET.finditer(text):
+        depth = depth + 1 if match[0] in "[{" else max(depth - 1, 0)
         deepest = max(deepest, depth)
     return deepest
 
@@ -242,8 +242,8 @@ def _refuse_multiplied(root: Any, path: Path) -> None:
             if id(node) in inside:
                 raise InputError("an entry holds itself", where=f"{path}, line {node.start_mark.line + 1}")
             inside.add(id(node))
-            held = [part for pair in node.value for part in (pair if isinstance(pair, tuple) else (pair,))]
-            counts[id(node)] = 1 + sum(map(entries, held))
+            parts = [part for pair in node.value for part in (pair if isinstance(pair, tuple) else (pair,))]
+            counts[id(node)] = 1 + sum(map(entries, parts))
             inside.discard(id(node))
         return counts[id(node)]
 

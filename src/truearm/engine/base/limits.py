@@ -96,25 +96,25 @@ def limit(name: str) -> int:
     return _changed(os.environ.get(VARIABLE, "")).get(name, LIMITS[name].most)
 
 
-def refuse_beyond(name: str, came: int, *, where: str | None = None, parameter: str | None = None) -> None:
+def refuse_beyond(name: str, count: int, *, where: str | None = None, parameter: str | None = None) -> None:
     """Refuse what is more than a limit allows.
 
     Args:
         name: Of the limit.
-        came: How much there is.
+        count: How much there is.
         where, parameter: What the refusal names.
     """
     most = limit(name)
-    if came <= most:
+    if count <= most:
         return
     known = LIMITS[name]
-    meant = came < _BEYOND_ALL
-    raised = f"More is allowed by the environment variable: {VARIABLE}={name}={came}." if meant else ""
+    meant = count < _BEYOND_ALL
+    raised = f"More is allowed by the environment variable: {VARIABLE}={name}={count}." if meant else ""
     raise InputError(
         known.what,
         parameter=parameter,
         where=where,
-        came=f"{came if meant else 'very many'} {known.unit}",
+        came=f"{count if meant else 'very many'} {known.unit}",
         allowed=f"{most} {known.unit} or fewer",
         cure=f"{known.cure} {raised}".strip() or None,
     )

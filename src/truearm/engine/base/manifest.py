@@ -46,10 +46,10 @@ class Unfinished:
     """What a run that has not finished replaces."""
 
     new: FileSet  #: The files that it writes.
-    kept: Mapping[str, str]  #: The names beside them that the old ones have meanwhile, of those that there were.
+    old_names: Mapping[str, str]  #: The names beside them that the old ones have meanwhile, of those that there were.
     #: The names of empty files beside the others, those that there were not. Whoever could write a mark, or copied one,
     #: may not write beside every file that it names: without its empty file, none is removed.
-    made: Mapping[str, str]
+    empty_names: Mapping[str, str]
 
 
 def hash_of(content: bytes) -> str:
@@ -65,13 +65,13 @@ def manifest_text(sets: Sequence[FileSet]) -> str:
 
 def unfinished_text(run: Unfinished) -> str:
     """Return the text of the mark of a run that has not finished."""
-    beside = {"kept": {**run.kept}, "made": {**run.made}}
+    beside = {"kept": {**run.old_names}, "made": {**run.empty_names}}
     return json.dumps({"truearm": _SCHEMAS[UNFINISHED], **_written(run.new), **beside}, indent=1) + "\n"
 
 
-def _written(one: FileSet) -> dict[str, Any]:
-    inputs = {"inputs": {**one.inputs}} if one.inputs else {}
-    return {"version": one.version, "command": one.command, **inputs, "files": {**one.files}}
+def _written(set_: FileSet) -> dict[str, Any]:
+    inputs = {"inputs": {**set_.inputs}} if set_.inputs else {}
+    return {"version": set_.version, "command": set_.command, **inputs, "files": {**set_.files}}
 
 
 def sets_in(folder: Path) -> tuple[FileSet, ...]:
@@ -82,7 +82,7 @@ def sets_in(folder: Path) -> tuple[FileSet, ...]:
     """
     content = _content(folder / MANIFEST)
     with _read_as_ours(folder / MANIFEST):
-        return () if content is None else tuple(_file_set(one) for one in _checked(content["sets"], list))
+        return () if content is None else tuple(_file_set(entry) for entry in _checked(content["sets"], list))
 
 
 def unfinished_in(folder: Path) -> Unfinished | None:
@@ -96,7 +96,7 @@ def unfinished_in(folder: Path) -> Unfinished | None:
         return None
     with _read_as_ours(folder / UNFINISHED):
         run = Unfinished(_file_set(content), _texts(content["kept"]), _texts(content["made"]))
-    if {*run.new.files} != {*run.kept, *run.made}:
+    if {*run.new.files} != {*run.old_names, *run.empty_names}:
         raise not_ours(folder / UNFINISHED)
     return run
 
@@ -163,10 +163,10 @@ def _read_as_ours(path: Path) -> Iterator[None]:
 
 def _content(path: Path) -> dict[str, Any] | None:
     try:
-        found = path.stat()
-        if _planted(found, path.parent):
+        status = path.stat()
+        if _planted(status, path.parent):
             return None
-        if not stat.S_ISREG(found.st_mode) or found.st_size > _LARGEST:
+        if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
             raise not_ours(path)
         content = json.loads(path.read_bytes())
     except (RecursionError, UnicodeDecodeError, json.JSONDecodeError) as error:
@@ -180,12 +180,12 @@ def _content(path: Path) -> dict[str, Any] | None:
     return content
 
 
-def _planted(found: os.stat_result, folder: Path) -> bool:
+def _planted(status: os.stat_result, folder: Path) -> bool:
     """Return whether a file is of somebody else, in a folder that everybody may write to: it is not believed."""
     if sys.platform == "win32":
         return False
     place = folder.stat()
-    return bool(place.st_mode & stat.S_ISVTX) and found.st_uid not in (os.getuid(), place.st_uid)
+    return bool(place.st_mode & stat.S_ISVTX) and status.st_uid not in (os.getuid(), place.st_uid)
 
 
 def _file_set(content: Any) -> FileSet:

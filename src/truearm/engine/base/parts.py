@@ -103,12 +103,12 @@ class Cluster(Workers):
 
     def _wait_for_workers(self) -> None:
         until = time.monotonic() + PATIENCE
-        while not (found := self._known(PATIENCE)):
+        while not (workers := self._known(PATIENCE)):
             if time.monotonic() > until:
                 raise self._refused("the scheduler has no workers", f"Start some with 'dask worker {self._address}'.")
             time.sleep(0.1)
-        self._refuse_other_versions([*found])
-        self._take(found)
+        self._refuse_other_versions([*workers])
+        self._take(workers)
 
     def _take(self, workers: dict[str, Any]) -> None:
         """Work with these from now on, two parts a thread: the next one is there when one is done."""
@@ -128,20 +128,20 @@ class Cluster(Workers):
         version_of = "truearm.engine.base.version:__version__"
         run = partial(self._client.run, pkgutil.resolve_name, version_of, workers=workers, on_error="return")
         try:
-            there = _within(_ANSWER, run)
+            versions = _within(_ANSWER, run)
         except TimeoutError as error:
             raise self._refused(
                 "workers of the scheduler do not answer", "Look at what they print, and start them again."
             ) from error
-        others = {address: version for address, version in there.items() if version != __version__}
+        others = {address: version for address, version in versions.items() if version != __version__}
         if others:
             address, version = next(iter(others.items()))
-            came = version if isinstance(version, str) else "no truearm"
+            shown_version = version if isinstance(version, str) else "no truearm"
             raise InputError(
                 f"{counted(len(others), 'worker')} of the scheduler {'has' if len(others) == 1 else 'have'} another "
                 f"version of truearm ({listed([*others])})",
                 parameter="scheduler",
-                came=Words(f"{came} on {address}"),
+                came=Words(f"{shown_version} on {address}"),
                 allowed=__version__,
                 cure="Install the same version on all of them.",
             )
@@ -179,15 +179,15 @@ class Cluster(Workers):
             return []
         self._looked = now
         try:
-            found = self._known(_ANSWER)
-            self._refuse_other_versions([address for address in found if address not in self._workers])
+            known = self._known(_ANSWER)
+            self._refuse_other_versions([address for address in known if address not in self._workers])
         except InputError:
             raise
         except Exception:  # of Dask, whose connection is being lost: its parts will say so
             return []
-        gone = [address for address in self._workers if address not in found]
-        self._take(found)
-        if found:
+        gone = [address for address in self._workers if address not in known]
+        self._take(known)
+        if known:
             self._seen = now
         elif now - self._seen > _ALONE:
             raise self._refused("all workers of the scheduler are gone")
@@ -236,9 +236,9 @@ def checked_address(address: str, *, insecure: bool) -> str:
 
 def _without_password(address: str) -> str:
     """Return an address as messages show it: nobody reads there what stands before an @."""
-    protocol, _, rest = address.rpartition("://")
+    protocol, _, location = address.rpartition("://")
     named = f"{protocol}://" if protocol in _PROTOCOLS else ""
-    return f"{named}...@{rest.rpartition('@')[2]}" if "@" in address else address
+    return f"{named}...@{location.rpartition('@')[2]}" if "@" in address else address
 
 
 def is_loopback(host: str) -> bool:
@@ -256,16 +256,16 @@ def _within(seconds: float, work: Callable[[], R]) -> R:
     Raises:
         TimeoutError: If it takes longer. What it does is then nobody's, and ends with this process.
     """
-    done = Future[R]()
+    future = Future[R]()
 
     def do() -> None:
         try:
-            done.set_result(work())
+            future.set_result(work())
         except BaseException as error:
-            done.set_exception(error)
+            future.set_exception(error)
 
     threading.Thread(target=do, daemon=True).start()
-    return done.result(seconds)
+    return future.result(seconds)
 
 
 def _distributed() -> Any:
@@ -293,7 +293,7 @@ _PATIENCE: Final = 1.0
 
 
 @dataclass(frozen=True)
-class Done(Generic[Part, Result]):
+class DonePart(Generic[Part, Result]):
     """A part with its result; lost, and without one, if the workers that did it died again and again."""
 
     part: Part
@@ -306,7 +306,7 @@ def done_parts(
     parts: Iterable[Part],
     workers: Workers,
     tell: Callable[[str], None] = lambda _: None,
-) -> Iterator[Done[Part, Result]]:
+) -> Iterator[DonePart[Part, Result]]:
     """Do parts of work, and return each as soon as it is done.
 
     Where a worker dies, new ones are started. Nobody knows of which of the parts that were being done it died, so they
@@ -343,7 +343,7 @@ class _Run(Generic[Part, Result]):
         self._suspects: deque[tuple[Part, int]] = deque()
         self._in_a_row = 0
 
-    def results(self) -> Iterator[Done[Part, Result]]:
+    def results(self) -> Iterator[DonePart[Part, Result]]:
         """Go on until every part is done or given up."""
         while self._hand_out():
             finished, _ = wait(self.running, _PATIENCE, FIRST_COMPLETED)
@@ -352,9 +352,9 @@ class _Run(Generic[Part, Result]):
             broken: BaseException | None = None
             for future in finished:
                 try:
-                    done = Done(self.running[future][0], future.result())
+                    outcome = DonePart(self.running[future][0], future.result())
                 except self._workers.lost:
-                    done = Done[Part, Result](self.running[future][0], None, lost=True)
+                    outcome = DonePart[Part, Result](self.running[future][0], None, lost=True)
                 except (BrokenExecutor, CancelledError) as error:
                     broken = error
                     continue
@@ -368,16 +368,16 @@ class _Run(Generic[Part, Result]):
                 else:
                     self._in_a_row = 0
                 del self.running[future]
-                yield done
+                yield outcome
             if broken is not None:
                 yield from self._broken(broken)
 
     def _hand_out(self) -> bool:
         """Hand out as many parts as may be done at once; return whether any is being done."""
         while not self._suspects and len(self.running) < self._workers.in_flight:
-            if not (found := [*islice(self._parts, 1)]):
+            if not (next_part := [*islice(self._parts, 1)]):
                 break
-            self._hand(found[0], -1)
+            self._hand(next_part[0], -1)
         while self._suspects and not self.running:
             self._hand(*self._suspects.popleft())
             if not self.running:
@@ -392,22 +392,22 @@ class _Run(Generic[Part, Result]):
         else:
             self.running[future] = part, deaths
 
-    def _broken(self, reason: BaseException) -> Iterator[Done[Part, Result]]:
+    def _broken(self, reason: BaseException) -> Iterator[DonePart[Part, Result]]:
         """Repeat what was being done, or give up the part of which a worker died alone too often."""
-        held = [(part, deaths + 1) for part, deaths in self.running.values()]
+        running = [(part, deaths + 1) for part, deaths in self.running.values()]
         self.running.clear()
-        part, deaths = held[0]
+        part, deaths = running[0]
         if deaths == _MOST_DEATHS:
             self._tell("a worker died of the same part again, and the part is given up")
         else:
-            self._tell(f"a worker died, and {counted(len(held), 'part')} will be repeated")
-            self._suspects.extendleft(reversed(held))
+            self._tell(f"a worker died, and {counted(len(running), 'part')} will be repeated")
+            self._suspects.extendleft(reversed(running))
         try:
             self._renew()
         except InputError as error:
             raise error from reason
         if deaths == _MOST_DEATHS:
-            yield Done(part, None, lost=True)
+            yield DonePart(part, None, lost=True)
 
     def _renew(self) -> None:
         self._in_a_row += 1

@@ -22,11 +22,11 @@ def validated(content: object, schema: type[Model], where: str) -> Model:
     if not isinstance(content, Mapping):
         raise InputError("the file must hold named entries", where=where, came=shown_entry(content), allowed=_ENTRIES)
     try:
-        made = schema.model_validate(dict(content))
+        model = schema.model_validate(dict(content))
     except ValidationError as error:
         raise _refusal(error, content, schema, where) from error
     _refuse_half_characters(content, where)
-    return made
+    return model
 
 
 def _refuse_half_characters(content: object, where: str) -> None:
@@ -196,8 +196,8 @@ def refused_value(fault: Mapping[str, Any], where: str, *, is_name: bool = False
 
 def _missing(where: str, name: str, holder: object, known: Sequence[str], kind: str | None) -> InputError:
     """Return the refusal of a table without an entry that it needs; it may be there under another name."""
-    there = holder if isinstance(holder, Mapping) else ()
-    others = [other for other in there if isinstance(other, str) and other not in known]
+    entries = holder if isinstance(holder, Mapping) else ()
+    others = [other for other in entries if isinstance(other, str) and other not in known]
     near = nearest_names(name, others, count=1)
     cure = f"It may be the entry {near[0]}, which is not known here: rename it." if near else "Add it."
     return InputError("this entry is missing", where=where, allowed=kind, cure=cure)

@@ -124,18 +124,18 @@ def quantity_si(
         InputError: If it is no number, or has no unit that fits.
     """
     match = re.fullmatch(r"\s*(?P<number>[^a-zA-Z]*(?:[eE][-+0-9]+)?)\s*(?P<unit>[a-zA-Z]*)\s*", text)
-    found = None if match is None else as_number(match["number"].strip())
-    if match is not None and found == 0.0 and not match["unit"] and not deviation:
+    value = None if match is None else as_number(match["number"].strip())
+    if match is not None and value == 0.0 and not match["unit"] and not deviation:
         return 0.0
-    if match is None or found is None or match["unit"] not in units:
+    if match is None or value is None or match["unit"] not in units:
         raise InputError(
-            "a number with its unit belongs here" if found is None else "no unit that fits is given",
+            "a number with its unit belongs here" if value is None else "no unit that fits is given",
             parameter=parameter,
             came=text,
             allowed=" or ".join(f"{number}{unit}" for unit in units),
             cure=f"Units are never guessed: write {whole}.",
         )
-    return sized_si(found, match["unit"], parameter=parameter, came=text, deviation=deviation)
+    return sized_si(value, match["unit"], parameter=parameter, came=text, deviation=deviation)
 
 
 def written(value: float, unit: str) -> float:
@@ -200,22 +200,22 @@ ROBOT_LINE: Final = _LINES[1]
 
 def parts_of(things: Iterable[object]) -> tuple[Marked, ...]:
     """Return what is simulated of some things: of each that says so itself, and of those in a sequence."""
-    found: set[Marked] = set()
+    parts: set[Marked] = set()
     for thing in things:
-        found.update(getattr(thing, "simulated_from", ()))
+        parts.update(getattr(thing, "simulated_from", ()))
         if isinstance(thing, tuple | list):
-            found.update(parts_of(part for part in thing if hasattr(part, "simulated_from")))
-    return tuple(part for part in ("data", "robot") if part in found)
+            parts.update(parts_of(part for part in thing if hasattr(part, "simulated_from")))
+    return tuple(part for part in ("data", "robot") if part in parts)
 
 
-def said_of(parts: Sequence[Marked]) -> list[str]:
+def mark_lines(parts: Sequence[Marked]) -> list[str]:
     """Return the line that says what is simulated; none of what is not."""
     return [f"{WORD} {_WORDS[tuple(parts)]}"] if parts else []
 
 
 def with_mark(lines: Iterable[str], parts: Sequence[Marked]) -> list[str]:
     """Return lines with the mark first, and only there."""
-    return [*said_of(parts), *without_mark(lines)] if parts else [*lines]
+    return [*mark_lines(parts), *without_mark(lines)] if parts else [*lines]
 
 
 def without_mark(lines: Iterable[str]) -> list[str]:

@@ -71,7 +71,7 @@ class Workers:
         """Let go of the workers, of what they are doing too unless they shall finish it."""
 
 
-class _Here(Executor):
+class _InThisThread(Executor):
     def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
         future = Future[R]()
         try:
@@ -85,7 +85,7 @@ class ThisProcess(Workers):
     """Parts are done here, one after the other."""
 
     def __init__(self) -> None:
-        super().__init__(_Here(), 1)
+        super().__init__(_InThisThread(), 1)
 
 
 class Processes(Workers):
@@ -192,8 +192,8 @@ class Given(Workers):
 
 def _words(error: Exception) -> Words:
     """Return the kind of an error and what it says, on one line."""
-    said = " ".join(str(error).split())
-    return Words(f"{type(error).__name__}: {said}" if said else type(error).__name__)
+    text = " ".join(str(error).split())
+    return Words(f"{type(error).__name__}: {text}" if text else type(error).__name__)
 
 
 @contextmanager

@@ -51,9 +51,9 @@ def writing_refused_at(path: Path) -> Iterator[None]:
 @contextmanager
 def alone_in(folders: Iterable[Path]) -> Iterator[None]:
     """Let other runs wait that write into the same folders; always in one order, so that no two wait for each other."""
-    with ExitStack() as held:
+    with ExitStack() as locks:
         for folder in sorted({folder.resolve() for folder in folders}):
-            held.enter_context(locked(folder, wait=True))
+            locks.enter_context(locked(folder, wait=True))
         yield
 
 
@@ -115,17 +115,17 @@ def replace_all(
     mark = folder / UNFINISHED
     staged = {target: _staged(target, content) for target, content in contents.items()}
     if len(contents) > 1:
-        kept, made = dict[str, str](), dict[str, str]()
+        old_names, empty_names = dict[str, str](), dict[str, str]()
         for target in contents:
             with writing_refused_at(target):
                 beside = _temporary(target)
                 if os.path.lexists(target):
-                    kept[_name(target, folder)] = beside.name
+                    old_names[_name(target, folder)] = beside.name
                     _keep(target, beside)
                 else:
-                    made[_name(target, folder)] = beside.name
+                    empty_names[_name(target, folder)] = beside.name
                     beside.touch(exist_ok=False)
-        run = Unfinished(file_set(folder, contents, command), kept, made)
+        run = Unfinished(file_set(folder, contents, command), old_names, empty_names)
         staged = {mark: _staged(mark, unfinished_text(run).encode()), **staged}
         synchronise(contents)
     for target, value in known.items():  # as late as can be: editors know nothing of locks
@@ -196,13 +196,13 @@ def undo_unfinished(folder: Path) -> None:
         return
     # not replaced yet, put back already, or changed since: such files stay
     targets = {name: folder / name for name, known in run.new.files.items() if is_the_known(folder / name, known)}
-    if not all(_stands_beside(targets[name], run.made[name]) for name in targets if name in run.made):
+    if not all(_stands_beside(targets[name], run.empty_names[name]) for name in targets if name in run.empty_names):
         raise not_ours(folder / UNFINISHED)
     for name, target in targets.items():
-        if name in run.made:
+        if name in run.empty_names:
             target.unlink()
-        elif _stands_beside(target, run.kept[name]):
-            old = target.with_name(run.kept[name])
+        elif _stands_beside(target, run.old_names[name]):
+            old = target.with_name(run.old_names[name])
             old.replace(target)
             old.unlink(missing_ok=True)  # where both were one file under two names
     synchronise(folder / name for name in run.new.files)
@@ -235,9 +235,9 @@ def _staged(target: Path, content: bytes) -> Path:
         return path
 
 
-def write_through(path: Path, how: int = os.O_RDWR) -> None:
+def write_through(path: Path, flags: int = os.O_RDWR) -> None:
     """Let what a file holds be on disk before its name is."""
-    handle = os.open(path, how)
+    handle = os.open(path, flags)
     try:
         os.fsync(handle)
     finally:
@@ -341,7 +341,7 @@ def put_in_place(source: Path, target: Path) -> None:
     """
     new_file(target)
     put_back_old(target.parent)
-    if any(target.name in one.files for one in sets_in(target.parent)):  # it was removed, and comes again
+    if any(target.name in set_.files for set_ in sets_in(target.parent)):  # it was removed, and comes again
         write_files(target.parent, {target.name: source.read_bytes()}, standing={target.name: None})
         source.unlink()
         return
@@ -409,10 +409,10 @@ def writable_file(path: Path) -> Path:
     return path
 
 
-def same_place(one: Path, other: Path) -> bool:
+def same_place(path: Path, other: Path) -> bool:
     """Return whether two paths lead to the same file, whether it exists or not."""
     try:
-        return one.resolve() == other.resolve() or one.samefile(other)
+        return path.resolve() == other.resolve() or path.samefile(other)
     except (OSError, RuntimeError, ValueError):  # where one of them does not exist, or links lead round
         return False
 
@@ -460,11 +460,11 @@ def write_files(
                 "the text for this file holds half a character", where=str(target), came=text[error.start]
             ) from error
     folders = dict.fromkeys((folder, *(target.parent for target in contents)))
-    made: list[Path] = []
+    created: list[Path] = []
     try:
         for place in folders:
             with writing_refused_at(place):
-                _make_folders(place, made)
+                _make_folders(place, created)
             put_back_old(place)
         with alone_in(folders):
             for place in folders:
@@ -478,9 +478,9 @@ def write_files(
                 if not os.path.lexists(folder / UNFINISHED):
                     for place in folders:
                         clear_temporary(place)
-        made.clear()
+        created.clear()
     finally:
-        for new in reversed(made):
+        for new in reversed(created):
             with suppress(OSError):  # somebody else has put something into it
                 new.rmdir()
 
@@ -501,20 +501,20 @@ def _with_manifest(
     """Return contents with the folder's manifest behind them, where they belong into one."""
     new = replace(file_set(folder, contents, command), inputs=inputs)
     before = sets_in(folder)
-    if len(contents) == 1 and not any(name in one.files for one in before for name in new.files):
+    if len(contents) == 1 and not any(name in set_.files for set_ in before for name in new.files):
         return {**contents}
     sets = []
-    for one in before:
-        stay = {name: known for name, known in one.files.items() if name not in new.files and exists(folder / name)}
+    for set_ in before:
+        stay = {name: known for name, known in set_.files.items() if name not in new.files and exists(folder / name)}
         if stay:
-            sets.append(replace(one, files=stay))
+            sets.append(replace(set_, files=stay))
     if len(contents) > 1:
         sets.append(new)
     return {**contents, folder / MANIFEST: manifest_text(sets).encode()}
 
 
-def _make_folders(folder: Path, made: list[Path]) -> None:
+def _make_folders(folder: Path, created: list[Path]) -> None:
     """Make a folder with those above it, and note which are new."""
     for missing in reversed([parent for parent in (folder, *folder.parents) if not parent.exists()]):
-        made.append(missing)
+        created.append(missing)
         missing.mkdir(exist_ok=True)

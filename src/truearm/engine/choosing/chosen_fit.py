@@ -9,9 +9,10 @@ from truearm.engine.base.errors import Notice, Rule, counted, listed
 from truearm.engine.choosing.search import CURVE
 from truearm.engine.choosing.selection import ORDERED, Selection
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.thinning import JUDGED_IN_PART
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Fit, Status, identify
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.rounds import Redundant
 from truearm.engine.robot.robot import Robot
@@ -29,7 +30,7 @@ def identify_chosen(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
-    held: Held = NOTHING_HELD,
+    held: FixedPlaces = NOTHING_FIXED,
     bootstrap: int = 0,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
@@ -58,7 +59,7 @@ def identify_chosen(
             redundancy=redundancy,
             bounds=bounds,
             bounds_file=bounds_file,
-            held=held,
+            fixed=held,
             bootstrap=bootstrap,
             seed=seed,
             progress=progress,
@@ -74,17 +75,12 @@ def identify_chosen(
         selection = selection.instead(fit.status.value)
 
 
-CHOSEN_IN_PART: Final = Rule(
-    "chosen-in-part", "note", "the data are large: `auto` chose the model by a part of the training configurations"
-)
-
-
 def check_part(compared: Dataset, data: Dataset) -> list[Notice]:
     """Say if a model was chosen by a part of the data."""
     if compared.configurations == data.configurations:
         return []
     return [
-        CHOSEN_IN_PART(
+        JUDGED_IN_PART(
             f"The data are large for so many effects: the model was chosen by {compared.configurations} of "
             f"{counted(data.configurations, 'training configuration')}, evenly spaced, and fitted to all of them."
         )

@@ -33,7 +33,7 @@ from truearm.engine.choosing.search import (
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.bounds import Bounds
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import Model, named_model
 from truearm.engine.fit.rounds import Redundant, Solved, find_parameters
@@ -161,7 +161,7 @@ class How:
     redundancy: Redundant
     bounds: Bounds | None
     bounds_file: str
-    held: Held
+    held: FixedPlaces
 
     def find(self, robot: Robot, data: Dataset, model: Model, small: float, near: Solved | None) -> Solved:
         """Return the parameters, as they are found when the search begins near others."""
@@ -173,7 +173,7 @@ class How:
             redundancy=self.redundancy,
             bounds=self.bounds,
             bounds_file=self.bounds_file,
-            held=self.held,
+            fixed=self.held,
             small=small,
             near=near,
         )
@@ -267,7 +267,7 @@ def select(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
-    held: Held = NOTHING_HELD,
+    held: FixedPlaces = NOTHING_FIXED,
     seed: int = 0,
     candidates: Sequence[str] = SELECTABLE,
     progress: Callable[[str], None] = lambda _: None,
@@ -304,7 +304,7 @@ def select(
         redundancy=redundancy,
         bounds=bounds,
         bounds_file=bounds_file,
-        held=held,
+        fixed=held,
     )
     grounds = tuple(Ground(solved, folds) for folds in draws_of(data, seed))
     choice = _Choice(robot, data, names, how, grounds, progress)

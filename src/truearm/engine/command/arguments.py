@@ -170,24 +170,24 @@ def new_file_for(out: object, parameter: str = "out") -> Path:
         return new_file(path_argument(out, parameter))
 
 
-def files_of(*given: object) -> tuple[Path, ...]:
+def files_of(*values: object) -> tuple[Path, ...]:
     """Return which files a job was given."""
-    named = [value for value in given if isinstance(value, str | Path)]
+    named = [value for value in values if isinstance(value, str | Path)]
     return tuple((urdf_source(value) or (Path(value), None))[0].absolute() for value in named)
 
 
-def hashes_of(**given: object) -> dict[str, str]:
+def hashes_of(**arguments: object) -> dict[str, str]:
     """Return the SHA-256 of each file that was given, by its parameter.
 
     They are taken before the files are read: of one that changes meanwhile, the hash is not that of the file later.
     """
-    found = {}
-    for parameter, value in given.items():
+    hashes = {}
+    for parameter, value in arguments.items():
         with refusals_of(parameter):
             for path in files_of(value):
                 if exists(path) and path.is_file():
-                    found[parameter] = hash_of(read_bytes(path))
-    return found
+                    hashes[parameter] = hash_of(read_bytes(path))
+    return hashes
 
 
 def files_argument(files: object, parameter: str) -> dict[str, Path]:
@@ -207,21 +207,21 @@ def payload_argument(payload: object, parameter: str = "payload") -> Payload | N
 
 def wrench_argument(wrench: object, frame: object, parameter: str = "wrench") -> Wrench | None:
     """Return what acts on the tool, of an object, a text or six numbers, in the axes of a frame; None for None."""
-    given = f"{parameter}_frame"
+    option = f"{parameter}_frame"
     if wrench is None:
         if frame is not None:
             raise InputError(
                 "a frame says in whose axes a force is, and no force is given",
-                parameter=given,
+                parameter=option,
                 came=frame,
                 cure=f"Give `{parameter}`, or leave it out.",
             )
         return None
-    axes_of = "base" if frame is None else choice_argument(frame, given, {name: name for name in WRENCH_FRAMES})
+    axes_of = "base" if frame is None else choice_argument(frame, option, {name: name for name in WRENCH_FRAMES})
     if not isinstance(wrench, Wrench):
         return Wrench.of(wrench, axes_of, parameter)
     if frame is not None and axes_of != wrench.frame:
-        raise InputError("the wrench says its own frame", parameter=given, came=frame, allowed=wrench.frame)
+        raise InputError("the wrench says its own frame", parameter=option, came=frame, allowed=wrench.frame)
     return wrench
 
 
@@ -273,10 +273,10 @@ def numbers_argument(values: object, parameter: str, count: int, allowed: str) -
         raise InputError(f"{count} numbers belong here", parameter=parameter, came=1, allowed=allowed)
     if not _is_sequence(values):
         raise wrong_kind(f"{count} numbers belong here", values, parameter, allowed)
-    found = [*values]
-    if len(found) != count:
-        raise InputError(f"{count} numbers belong here", parameter=parameter, came=len(found), allowed=allowed)
-    return tuple(finite_number(value, parameter) for value in found)
+    numbers = [*values]
+    if len(numbers) != count:
+        raise InputError(f"{count} numbers belong here", parameter=parameter, came=len(numbers), allowed=allowed)
+    return tuple(finite_number(value, parameter) for value in numbers)
 
 
 def _is_sequence(values: object) -> TypeGuard[Sequence[object]]:
@@ -335,8 +335,8 @@ def lengths_argument(
     """
     if one_for_all and isinstance(values, Real):
         return (length_argument(values, parameter, lowest),) * count
-    found = numbers_argument(values, parameter, count, f"{count} lengths{', or one for all' if one_for_all else ''}")
-    return tuple(length_argument(value, parameter, lowest) for value in found)
+    numbers = numbers_argument(values, parameter, count, f"{count} lengths{', or one for all' if one_for_all else ''}")
+    return tuple(length_argument(value, parameter, lowest) for value in numbers)
 
 
 def array_argument(values: object, parameter: str, shape: tuple[int | str, ...], allowed: str) -> Array:
@@ -431,9 +431,9 @@ def notes_argument(notes: object, parameter: str = "notes") -> dict[str, str]:
         raise wrong_kind("notes by name belong here", notes, parameter, "a dict of names and texts")
     if len(notes) > _MOST_NOTES:
         raise InputError("there are too many notes", parameter=parameter, came=len(notes), allowed=f"{_MOST_NOTES}")
-    found = {}
-    for name, said in notes.items():
-        for text, most in zip((name, said), _NOTE, strict=True):
+    checked = {}
+    for name, note in notes.items():
+        for text, most in zip((name, note), _NOTE, strict=True):
             if not isinstance(text, str):
                 raise wrong_kind("a text belongs here", text, parameter, "a text")
             if not text.strip() or len(text) > most or not text.isprintable():
@@ -443,8 +443,8 @@ def notes_argument(notes: object, parameter: str = "notes") -> dict[str, str]:
                     came=text,
                     allowed=f"a name of 1 to {_NOTE[0]} characters, and a text of 1 to {_NOTE[1]}",
                 )
-        found[name.strip()] = said.strip()
-    return found
+        checked[name.strip()] = note.strip()
+    return checked
 
 
 def device_argument(device: object, parameter: str = "device") -> Device:
@@ -481,6 +481,6 @@ def written_in_python(value: object) -> str:
         words = ", ".join(written_in_python(entry) for entry in value)
         return f"[{words}]"
     if isinstance(value, dict):
-        return f"{{{', '.join(f'{name!r}: {written_in_python(one)}' for name, one in value.items())}}}"
+        return f"{{{', '.join(f'{name!r}: {written_in_python(entry)}' for name, entry in value.items())}}}"
     plain = value is None or isinstance(value, str | bool | int | float)
     return repr(value) if plain else type(value).__name__.upper()

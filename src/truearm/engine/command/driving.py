@@ -89,17 +89,17 @@ def cell_argument(
         height = 0.0
         if constraints is not None and constraints.floor is not None:
             height = min(0.0, sized_si(constraints.floor, constraints.units.length, f"{where}, floor"))
-    room = CLEARANCE if clearance is None else length_argument(clearance, "clearance", 0.0)
-    if 0.0 < room < LEAST_CLEARANCE:
+    required = CLEARANCE if clearance is None else length_argument(clearance, "clearance", 0.0)
+    if 0.0 < required < LEAST_CLEARANCE:
         raise InputError(
             "so little room is kept by no arm whose thickness is estimated",
             parameter="clearance",
-            came=f"{room * 1e3:g} mm",
+            came=f"{required * 1e3:g} mm",
             allowed=f"0 mm, or {LEAST_CLEARANCE * 1e3:g} mm and more",
             cure="Check its unit.",
         )
     boxes = boxes_of({} if constraints is None else keep_out(constraints, where))
-    return Cell(height, boxes, room, FLOOR if standing else MOUNTING)
+    return Cell(height, boxes, required, FLOOR if standing else MOUNTING)
 
 
 def finder_argument(
@@ -118,12 +118,12 @@ def finder_argument(
             beyond the limits, or none was found.
     """
     low, high = joint_window(robot, constraints, where)
-    given = None
+    home_joints = None
     if home is not None:
         count = len(robot.joints)
-        given = np.array(numbers_argument(home, "home", count, f"{count}, one for each joint of {robot.name}"))
+        home_joints = np.array(numbers_argument(home, "home", count, f"{count}, one for each joint of {robot.name}"))
     check = CollisionCheck(robot, cell)
-    at = safe_configuration(check, low, high) if given is None else checked_home(check, given, low, high)
+    at = safe_configuration(check, low, high) if home_joints is None else checked_home(check, home_joints, low, high)
     return WayFinder(check, at, low, high)
 
 

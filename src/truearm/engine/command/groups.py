@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from truearm.engine.command.kinds import (
     Again,
+    Callback,
     Choice,
     Doing,
     File,
@@ -24,7 +25,6 @@ from truearm.engine.command.kinds import (
     PayloadKind,
     Positions,
     Text,
-    Told,
     TruthKind,
     Whole,
     WrenchKind,
@@ -298,7 +298,7 @@ class Long(Request):
     """What takes so long that somebody may want to be told how far it is."""
 
     progress: Callable[[str], None] = option(
-        Told(), "Called with a few words at each step", default=_silent, word="", repeated=False
+        Callback(), "Called with a few words at each step", default=_silent, word="", repeated=False
     )
 
 

@@ -251,12 +251,12 @@ class Numbers(Kind):
         from truearm.engine.base.units import sized_si
         from truearm.engine.command.texts import read_numbers
 
-        found = read_numbers(typed, name, self.example or f"numbers in {self.at_edges}")
-        return [sized_si(one, self.at_edges, parameter=name) for one in found] if self.is_converted else found
+        numbers = read_numbers(typed, name, self.example or f"numbers in {self.at_edges}")
+        return [sized_si(number, self.at_edges, parameter=name) for number in numbers] if self.is_converted else numbers
 
     def typed_again(self, value: Any) -> list[str]:
         """Return them with commas between."""
-        return [",".join(text for one in value for text in Number(self.at_edges).typed_again(one))]
+        return [",".join(text for number in value for text in Number(self.at_edges).typed_again(number))]
 
 
 @dataclass(frozen=True)
@@ -390,7 +390,7 @@ class Gravity(Given):
 
     def typed_again(self, value: Any) -> list[str]:
         """Return them with commas between."""
-        return [",".join(text for one in value for text in Number().typed_again(one))]
+        return [",".join(text for number in value for text in Number().typed_again(number))]
 
 
 class NotesKind(Given):
@@ -408,16 +408,16 @@ class NotesKind(Given):
         """Return the notes that texts such as ``serial=1234`` hold."""
         notes: dict[str, str] = {}
         for text in typed:
-            key, given, said = text.partition("=")
-            if not given or key.strip() in notes:
-                what = "a note was given twice" if given else "a note is a name and a text"
+            key, separator, note = text.partition("=")
+            if not separator or key.strip() in notes:
+                what = "a note was given twice" if separator else "a note is a name and a text"
                 raise InputError(what, parameter=name, came=text, allowed="NAME=TEXT, such as serial=1234")
-            notes[key.strip()] = said
+            notes[key.strip()] = note
         return notes
 
     def typed_again(self, value: Mapping[str, str]) -> list[str]:
         """Return them as they are typed."""
-        return [f"{name}={said}" for name, said in value.items()]
+        return [f"{name}={note}" for name, note in value.items()]
 
 
 class WrenchKind(Given):
@@ -471,8 +471,8 @@ class NamedFiles(Given):
         """Return the files of texts such as ``base=points.txt``."""
         named: dict[str, str] = {}
         for text in typed:
-            key, given, file = text.partition("=")
-            if not key or not given or not file:
+            key, separator, file = text.partition("=")
+            if not key or not separator or not file:
                 allowed = f"NAME={self.what.upper()}"
                 raise InputError(f"a name and a {self.what} belong here", parameter=name, came=text, allowed=allowed)
             if key in named:
@@ -485,7 +485,7 @@ class NamedFiles(Given):
         return [f"{name}={file}" for name, file in value.items()]
 
 
-class Told(Given):
+class Callback(Given):
     """A function that is called with a few words at each step; it is no part of what is asked for."""
 
     def check(self, value: Any, name: str) -> Any:

@@ -82,23 +82,23 @@ class Command(TyperCommand):
 class Commands(typer.Typer):
     """A group of commands that are all a :class:`Command`."""
 
-    def command(self, name: str | None = None, **how: Any) -> Callable[[C], C]:
+    def command(self, name: str | None = None, **settings: Any) -> Callable[[C], C]:
         """Add a command."""
-        return super().command(name, cls=Command, **how)
+        return super().command(name, cls=Command, **settings)
 
 
 def spelled(text: str) -> str:
     """Return a text of the library with options of the running command instead of parameters in backticks."""
 
-    def one(name: str, value: str | None) -> str:
+    def spell(name: str, value: str | None) -> str:
         if value is None:
             return _option(name)
         return _flag(f"{name}_{value}") or f"{_option(name)} {value}"
 
-    return with_parameters(text, one)
+    return with_parameters(text, spell)
 
 
-def _given(context: typer.Context, name: str) -> bool:
+def _is_typed(context: typer.Context, name: str) -> bool:
     source = context.get_parameter_source(name)
     return source is not None and source.name != "DEFAULT"
 
@@ -170,10 +170,10 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
     """
     instead, others = request.instead, {device.of_device: device for device in of_devices}
     declared, owners = dict[str, Option](), dict[str, type[Request]]()
-    for one in (request, *others.values()):
-        for name, option in one.options():
+    for source in (request, *others.values()):
+        for name, option in source.options():
             declared.setdefault(name, option)
-            owners.setdefault(name, one)
+            owners.setdefault(name, source)
 
     def run(**typed: Any) -> None:
         as_json, details = typed.pop("json", False), typed.pop("details", True)
@@ -181,14 +181,14 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
         if instead is not None and typed.pop(instead.job):
             wanted, typed = instead, _only_those(typed, instead, declared)
         own = dict(wanted.options())
-        given = {name: own[name].kind.read(value, name) for name, value in _given_of(wanted, others, typed).items()}
+        values = {name: own[name].kind.read(value, name) for name, value in _values_of(wanted, others, typed).items()}
         with (
             progress() if "progress" in own else nullcontext() as say,
-            _shown_if_kept(as_json=as_json, details=details),
+            _shown_if_refused(as_json=as_json, details=details),
         ):
-            asked = wanted(**given)
-            said = {"command": asked.as_command(), "progress": say, "tell": partial(print_line, err=as_json)}
-            result = replace(asked, **{name: value for name, value in said.items() if name in own}).result()
+            asked = wanted(**values)
+            context = {"command": asked.as_command(), "progress": say, "tell": partial(print_line, err=as_json)}
+            result = replace(asked, **{name: value for name, value in context.items() if name in own}).result()
         _show(result, as_json=as_json, details=details)
         out = getattr(asked, "out", None)
         written = "" if out is None else result.written_at(str(out))
@@ -205,15 +205,15 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in (("details", Details), ("json", Json))
     ]
-    every = [*sorted(asked, key=lambda one: one.default is not inspect.Parameter.empty), *flags]
+    every = [*sorted(asked, key=lambda parameter: parameter.default is not inspect.Parameter.empty), *flags]
     run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
-    run.__annotations__ = {one.name: one.annotation for one in every}
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in every}
     run.__doc__ = spelled_by(request.help_text(), declared)
     run.__name__ = request.job
     words = {
-        f"--{one.formerly}": flag_of(name, one)
-        for name, one in declared.items()
-        if one.formerly and not one.is_argument
+        f"--{option.formerly}": flag_of(name, option)
+        for name, option in declared.items()
+        if option.formerly and not option.is_argument
     }
     run.today = words  # type: ignore[attr-defined]
     return run
@@ -221,25 +221,25 @@ def command_of(request: type[Request], *of_devices: type[Request]) -> Callable[.
 
 def _with_flags(typed: Mapping[str, Any], declared: Mapping[str, Option]) -> dict[str, Any]:
     """Return what was typed, with the values of options that have flags for them."""
-    given = dict(typed)
+    values = dict(typed)
     for name, option in declared.items():
         if isinstance(option.kind, ByFlags):
-            chosen = [value for value in option.kind.flags if given.pop(f"{name}_{value}")]
+            chosen = [value for value in option.kind.flags if values.pop(f"{name}_{value}")]
             if len(chosen) > 1:
                 named = ", ".join(f"{name}_{value}" for value in chosen)
                 raise InputError("only one of them can hold", parameter=named, cure="Leave one out.")
             if chosen:
-                given[name] = chosen[0]
-    return given
+                values[name] = chosen[0]
+    return values
 
 
-def _only_those(given: Mapping[str, Any], instead: type[Request], declared: Mapping[str, Option]) -> dict[str, Any]:
+def _only_those(values: Mapping[str, Any], instead: type[Request], declared: Mapping[str, Option]) -> dict[str, Any]:
     """Return what was given of the options that another request takes, or refuse what it does not take."""
     own, context = dict(instead.options()), _running.get()
-    for name in given:
-        if name not in own and not declared[name].is_argument and context is not None and _given(context, name):
+    for name in values:
+        if name not in own and not declared[name].is_argument and context is not None and _is_typed(context, name):
             raise InputError("only one of them can hold", parameter=f"{instead.job}, {name}", cure="Leave one out.")
-    return {name: value for name, value in given.items() if name in own}
+    return {name: value for name, value in values.items() if name in own}
 
 
 def _flag_parameter(name: str, word: str, help: str) -> inspect.Parameter:
@@ -249,27 +249,27 @@ def _flag_parameter(name: str, word: str, help: str) -> inspect.Parameter:
 
 def _parameters(name: str, declared: Mapping[str, Option], default: Any) -> Iterator[inspect.Parameter]:
     """Yield what the command takes of an option: nothing, the option, or a flag for each value."""
-    one = declared[name]
-    if not one.in_command:
+    option = declared[name]
+    if not option.in_command:
         return
-    if isinstance(one.kind, ByFlags):
-        for value, (word, text) in one.kind.flags.items():
+    if isinstance(option.kind, ByFlags):
+        for value, (word, text) in option.kind.flags.items():
             yield _flag_parameter(f"{name}_{value}", word, text)
     else:
-        yield _parameter(name, one, default, declared)
+        yield _parameter(name, option, default, declared)
 
 
-def _given_of(request: type[Request], others: Mapping[str, type[Request]], typed: Mapping[str, Any]) -> dict[str, Any]:
+def _values_of(request: type[Request], others: Mapping[str, type[Request]], typed: Mapping[str, Any]) -> dict[str, Any]:
     """Return what was typed, by option; refuse options of the requests for other devices."""
     context, own, device = _running.get(), dict(request.options()), typed.get("device")
-    given = {
+    values = {
         name: value
         for name, value in typed.items()
         if value is not None
-        and (context is None or name not in context.params or _given(context, name))
+        and (context is None or name not in context.params or _is_typed(context, name))
         and (name != "device" or name in own)
     }
-    for name, value in given.items():
+    for name, value in values.items():
         if name in own:
             continue
         if "device" not in own:
@@ -281,7 +281,7 @@ def _given_of(request: type[Request], others: Mapping[str, type[Request]], typed
             came=value,
             cure=f"Leave `{name}` out, or use `device={of[0]}`.",
         )
-    return given
+    return values
 
 
 def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, Option]) -> inspect.Parameter:
@@ -296,36 +296,36 @@ def _parameter(name: str, declared: Option, default: Any, others: Mapping[str, O
     typed = kind.typed
     if declared.is_argument:
         shown: Any = declared.shown if isinstance(declared.shown, str) else False
-        how: Any = typer.Argument(metavar=metavar, help=text, show_default=shown)
+        info: Any = typer.Argument(metavar=metavar, help=text, show_default=shown)
     else:
-        told = isinstance(declared.shown, str) or (declared.shown and default not in (None, ()))
-        shown = declared.shown if told and not declared.needed else False
+        is_shown = isinstance(declared.shown, str) or (declared.shown and default not in (None, ()))
+        shown = declared.shown if is_shown and not declared.needed else False
         shown = spelled_by(shown, others) if isinstance(shown, str) else shown
         only: dict[str, Any] = {} if typed is bool else {"metavar": metavar, "show_default": shown}
-        how = typer.Option(flag, help=text, rich_help_panel=declared.panel, **only)
-    given: Any
+        info = typer.Option(flag, help=text, rich_help_panel=declared.panel, **only)
+    preset: Any
     if declared.needed:
-        given = inspect.Parameter.empty
+        preset = inspect.Parameter.empty
     elif default in (None, ()):
-        typed, given = typed | None, None
+        typed, preset = typed | None, None
     else:
-        (given,) = (default,) if typed is bool else kind.typed_again(default)
-        given = typed(given) if typed in (int, float) else given
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=given, annotation=Annotated[typed, how])
+        (preset,) = (default,) if typed is bool else kind.typed_again(default)
+        preset = typed(preset) if typed in (int, float) else preset
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=preset, annotation=Annotated[typed, info])
 
 
 def spelled_by(text: str, declared: Mapping[str, Option]) -> str:
     """Return a text with the words of the command instead of parameters in backticks."""
 
-    def one(name: str, value: str | None) -> str:
+    def spell(name: str, value: str | None) -> str:
         flag = flag_of(name, declared[name]) if name in declared else f"--{name.replace('_', '-')}"
         return flag if value is None else f"{flag} {value}"
 
-    return with_parameters(text, one)
+    return with_parameters(text, spell)
 
 
 @contextmanager
-def _shown_if_kept(*, as_json: bool, details: bool) -> Iterator[None]:
+def _shown_if_refused(*, as_json: bool, details: bool) -> Iterator[None]:
     """Show a result also where it is not written, because a better one stays."""
     try:
         yield

@@ -36,29 +36,29 @@ class Excluded:
 def excluded_block(excluded: Sequence[Excluded]) -> Block:
     """Return how many readings of each part were excluded, and why."""
     parts = Counter[str]()
-    for one in excluded:
-        parts[one.part] += one.readings
-    told = ", ".join(f"{count} {_OF[part]}" for part, count in parts.items())
+    for exclusion in excluded:
+        parts[exclusion.part] += exclusion.readings
+    by_part = ", ".join(f"{count} {_OF[part]}" for part, count in parts.items())
     rows = [
         {
-            "configuration": one.row.configuration,
-            "target": one.row.target,
-            **({"visit": one.row.visit} if one.row.visit else {}),
-            **({"fixture": one.row.fixture} if one.row.fixture else {}),
-            "reason": one.row.reason,
-            "readings": one.readings,
-            "part": one.part,
+            "configuration": exclusion.row.configuration,
+            "target": exclusion.row.target,
+            **({"visit": exclusion.row.visit} if exclusion.row.visit else {}),
+            **({"fixture": exclusion.row.fixture} if exclusion.row.fixture else {}),
+            "reason": exclusion.row.reason,
+            "readings": exclusion.readings,
+            "part": exclusion.part,
         }
-        for one in excluded
+        for exclusion in excluded
     ]
-    return say(f"Excluded: {counted(parts.total(), 'reading')} ({told}): {reasons(excluded)}", excluded=rows)
+    return say(f"Excluded: {counted(parts.total(), 'reading')} ({by_part}): {reasons(excluded)}", excluded=rows)
 
 
 def reasons(excluded: Sequence[Excluded]) -> str:
     """Return the reasons, each with how many readings have it."""
     counter = Counter[str]()
-    for one in excluded:
-        counter[one.row.reason] += one.readings
+    for exclusion in excluded:
+        counter[exclusion.row.reason] += exclusion.readings
     return ", ".join(f"{reason} ({count})" for reason, count in counter.items())
 
 
@@ -79,8 +79,8 @@ def without_excluded(data: Dataset, exclude: str | Path | None) -> tuple[Dataset
     path = path_argument(exclude, "exclude")
     with refusals_of("exclude"):
         rows = read_exclusions(path)
-        made, counts = without_readings(data, rows)
-    return made, tuple(Excluded(row, count, "training") for row, count in zip(rows, counts, strict=True))
+        remaining, counts = without_readings(data, rows)
+    return remaining, tuple(Excluded(row, count, "training") for row, count in zip(rows, counts, strict=True))
 
 
 def in_parts(excluded: tuple[Excluded, ...], split: Dataset, held_out: IntArray) -> tuple[Excluded, ...]:
@@ -94,15 +94,15 @@ def in_parts(excluded: tuple[Excluded, ...], split: Dataset, held_out: IntArray)
     def part(label: str) -> Part:
         return "held out" if label in judging else "training" if label in known else "left out"
 
-    return tuple(Excluded(one.row, one.readings, part(one.row.configuration)) for one in excluded)
+    return tuple(Excluded(entry.row, entry.readings, part(entry.row.configuration)) for entry in excluded)
 
 
 def count_excluded(excluded: tuple[Excluded, ...]) -> dict[str, int]:
     """Return how many readings of each target are excluded, of configurations that are not left out."""
     counter = Counter[str]()
-    for one in excluded:
-        if one.part != "left out":
-            counter[one.row.target] += one.readings
+    for exclusion in excluded:
+        if exclusion.part != "left out":
+            counter[exclusion.row.target] += exclusion.readings
     return dict(counter)
 
 
@@ -115,7 +115,7 @@ EXCLUDED: Final = Rule(
 
 def excluded_notices(excluded: tuple[Excluded, ...]) -> list[Notice]:
     """Say how many readings are excluded, before any split."""
-    count = sum(one.readings for one in excluded)
+    count = sum(exclusion.readings for exclusion in excluded)
     if not count:
         return []
     return [
@@ -145,23 +145,23 @@ def check_excluded(
         as_read: The data that were split, with the excluded readings; None if they cannot be compared.
         without: Errors on the held-out part as it judges; None if there is none.
     """
-    mine = tuple(one for one in excluded if one.part == "held out")
-    count = sum(one.readings for one in mine)
+    of_held_out = tuple(exclusion for exclusion in excluded if exclusion.part == "held out")
+    count = sum(exclusion.readings for exclusion in of_held_out)
     if not count:
         return []
-    told = ""
+    advice = ""
     if as_read is not None and without is not None:
         whole = errors_of(robot, without_table_motion(as_read).of_configurations(held_out))
         some, every = without.position or without.length, whole.position or whole.length
         if some is not None and every is not None:
             it = "it" if count == 1 else "them"
-            told = (
+            advice = (
                 f" With {it} the held-out errors are {every.mean * 1e3:.3f} mm on average and {every.max * 1e3:.3f} mm "
                 f"at most; without {it} {some.mean * 1e3:.3f} and {some.max * 1e3:.3f} mm."
             )
     return [
         HELD_OUT_EXCLUDED(
             f"{counted(count, 'reading')} of the held-out part {'is' if count == 1 else 'are'} excluded: "
-            f"{reasons(mine)}.{told} {_RULE}"
+            f"{reasons(of_held_out)}.{advice} {_RULE}"
         )
     ]

@@ -72,8 +72,8 @@ def option(
         kw_only: Whether Python takes it by its name alone; the command has another as an argument if it has no word.
     """
     argument = is_argument or (not kw_only and word is None)
-    made = Option(kind, help, metavar, word, shown, more, needed, argument, repeated, panel, formerly)
-    return field(default=default, kw_only=kw_only, metadata={"option": made})
+    declaration = Option(kind, help, metavar, word, shown, more, needed, argument, repeated, panel, formerly)
+    return field(default=default, kw_only=kw_only, metadata={"option": declaration})
 
 
 def required(
@@ -92,15 +92,15 @@ def required(
     Args:
         kw_only: Whether Python takes it by its name alone.
     """
-    made = Option(kind, help, metavar, word, False, more, True, not word, repeated, formerly=formerly)
-    return field(kw_only=kw_only, metadata={"option": made})
+    declaration = Option(kind, help, metavar, word, False, more, True, not word, repeated, formerly=formerly)
+    return field(kw_only=kw_only, metadata={"option": declaration})
 
 
 def as_in(group: type[Request], name: str, *, default: Any = MISSING, kw_only: bool = True, **other: Any) -> Any:
     """Declare an option as a group does, but with another default or none, or otherwise shown."""
-    made: Option = replace(group.__dataclass_fields__[name].metadata["option"], needed=default is MISSING)
-    made = replace(made, is_argument=not kw_only and other.get("word", made.word) is None)
-    return field(default=default, kw_only=kw_only, metadata={"option": replace(made, **other)})
+    declaration: Option = replace(group.__dataclass_fields__[name].metadata["option"], needed=default is MISSING)
+    declaration = replace(declaration, is_argument=not kw_only and other.get("word", declaration.word) is None)
+    return field(default=default, kw_only=kw_only, metadata={"option": replace(declaration, **other)})
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option, required, as_in))
@@ -121,8 +121,8 @@ class Request:
     refuses: ClassVar[str] = "For anything that cannot be used, with a message that says what to do."
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
-    def __init_subclass__(cls, **how: Any) -> None:
-        super().__init_subclass__(**how)
+    def __init_subclass__(cls, **settings: Any) -> None:
+        super().__init_subclass__(**settings)
         dataclass(frozen=True, eq=False, repr=False)(cls)
 
     def __post_init__(self) -> None:
@@ -139,23 +139,23 @@ class Request:
 
     def result(self) -> Any:
         """Do what is asked for; the result keeps the request, without what only this run needed."""
-        made = self.run()
-        if hasattr(made, "request"):
-            kept = copy(self)
+        result = self.run()
+        if hasattr(result, "request"):
+            request = copy(self)
             for name, declared in self.options():
                 value = getattr(self, name)
                 if not (declared.in_command or declared.repeated):
-                    object.__setattr__(kept, name, self.default(name))
+                    object.__setattr__(request, name, self.default(name))
                 elif isinstance(value, list | dict) or hasattr(value, "shape"):  # whoever gave it may change it
-                    object.__setattr__(kept, name, deepcopy(value))
-            object.__setattr__(made, "request", kept)
-        return made
+                    object.__setattr__(request, name, deepcopy(value))
+            object.__setattr__(result, "request", request)
+        return result
 
     @classmethod
     def options(cls) -> Iterator[tuple[str, Option]]:
         """Yield the options by their names: what Python takes by position, those of the class, those of its groups."""
-        every = {one.name: one for one in fields(cls)}
-        first = [name for name, one in every.items() if not one.kw_only]
+        every = {entry.name: entry for entry in fields(cls)}
+        first = [name for name, entry in every.items() if not entry.kw_only]
         own = [name for owner in cls.__mro__ for name in vars(owner).get("__annotations__", ()) if name in every]
         for name in dict.fromkeys([*first, *own]):
             yield name, every[name].metadata["option"]
@@ -179,7 +179,7 @@ class Request:
     @classmethod
     def renamed(cls, named: Mapping[str, Any]) -> dict[str, Any]:
         """Return arguments of the job by the names of today, and warn of older ones."""
-        today = {one.formerly: name for name, one in cls.options() if one.formerly}
+        today = {declared.formerly: name for name, declared in cls.options() if declared.formerly}
         for old in [name for name in named if name in today]:
             warnings.warn(f"`{old}` of {cls.job} is `{today[old]}` now.", DeprecationWarning, stacklevel=3)
             if today[old] in named:
@@ -204,8 +204,8 @@ class Request:
 
         words = []
         for name, _, value in self.given():
-            said = written_in_python(value)
-            words.append(said if not self.__dataclass_fields__[name].kw_only else f"{name}={said}")
+            text = written_in_python(value)
+            words.append(text if not self.__dataclass_fields__[name].kw_only else f"{name}={text}")
         space, _, short = self.job.partition("_")
         name = f"{SPACES[space]}.{short}" if space in SPACES else self.job
         return f"truearm.{name}({', '.join(words)})"
@@ -257,23 +257,23 @@ class Runs(Protocol[R]):
 
 def job(request: Callable[P, Runs[R]]) -> Callable[P, R]:
     """Return the function that makes a request and runs it."""
-    made: Any = request
+    request_class: Any = request
 
-    def run(*given: P.args, **named: P.kwargs) -> R:
-        result: R = made(*given, **made.renamed(named)).result()
+    def run(*values: P.args, **named: P.kwargs) -> R:
+        result: R = request_class(*values, **request_class.renamed(named)).result()
         return result
 
     frame = sys._getframe(1)
-    run.__name__ = run.__qualname__ = made.job
+    run.__name__ = run.__qualname__ = request_class.job
     run.__module__ = frame.f_globals["__name__"]
-    taken = inspect.signature(made).parameters
-    ordered = [taken[name] for name, _ in made.options()]
-    signature = inspect.Signature(ordered, return_annotation=made.run.__annotations__["return"])
+    taken = inspect.signature(request_class).parameters
+    ordered = [taken[name] for name, _ in request_class.options()]
+    signature = inspect.Signature(ordered, return_annotation=request_class.run.__annotations__["return"])
     run.__signature__ = signature  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in signature.parameters.values()}
     run.__annotations__["return"] = signature.return_annotation
-    run.__doc__ = docstring(made)
-    run.request = made  # type: ignore[attr-defined]
+    run.__doc__ = docstring(request_class)
+    run.request = request_class  # type: ignore[attr-defined]
     return run
 
 

@@ -63,12 +63,12 @@ def left_out(data: Dataset, labels: Sequence[str]) -> Dataset:
                 came=label,
                 cure=did_you_mean(label, data.labels) or "Name configurations of the data.",
             )
-    kept = [i for i, label in enumerate(data.labels) if label not in set(labels)]
-    if not kept:
+    indices = [i for i, label in enumerate(data.labels) if label not in set(labels)]
+    if not indices:
         raise InputError(
             "no configuration would be left", parameter="without", where=data.source, cure="Leave out fewer."
         )
-    return data.of_configurations(kept)
+    return data.of_configurations(indices)
 
 
 def without_words(labels: Sequence[str]) -> str:
@@ -155,18 +155,18 @@ def check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[
     again = [label for label in revisits(data, held_out, training) if label not in known]
     if not seen and not again:
         return []
-    told = []
+    parts = []
     if seen:
-        told.append(f"{len(seen)} {'is a copy' if len(seen) == 1 else 'are copies'} of training ones ({listed(seen)})")
+        parts.append(f"{len(seen)} {'is a copy' if len(seen) == 1 else 'are copies'} of training ones ({listed(seen)})")
     if again:
-        told.append(
+        parts.append(
             f"{len(again)} {'has' if len(again) == 1 else 'have'} the same joint positions as training ones "
             f"({listed(again)})"
         )
     cures = ["Leave copies out; for a bootstrap, draw from the training configurations alone and use `train=all`."]
     return [
         HELD_OUT_SEEN(
-            f"Of {counted(len(held_out), 'held-out configuration')} {' and '.join(told)}: the fit has seen them, and "
+            f"Of {counted(len(held_out), 'held-out configuration')} {' and '.join(parts)}: the fit has seen them, and "
             f"the errors flatter it. "
             + " ".join(
                 [
@@ -292,11 +292,11 @@ def refuse_unaccepted(robot: Robot, accept: tuple[str, ...]) -> None:
         InputError: With what the calibration said.
     """
     judged = (_ELSEWHERE,) if arm_is_known(robot) else ()
-    against = {name: said for name, said in _against(robot).items() if name not in (*accept, *judged)}
+    against = {name: reason for name, reason in _against(robot).items() if name not in (*accept, *judged)}
     if against:
         name, message = next(iter(against.items()))
         others = f" It also ended with {', '.join([*against][1:])}." if len(against) > 1 else ""
-        words = " and ".join(f"`accept={one}`" for one in against)
+        words = " and ".join(f"`accept={code}`" for code in against)
         raise InputError(
             "the calibration of this robot does not hold well enough to correct programs with it",
             parameter="robot",
@@ -344,7 +344,7 @@ def known_of(robot: Robot) -> list[Notice]:
                 "targets cannot be predicted."
             )
         ]
-    return told_of(robot)
+    return faults_of(robot)
 
 
 CHANGED_SINCE_WRITTEN: Final = Rule(
@@ -370,7 +370,7 @@ def changed_since(robot: object) -> list[Notice]:
     ]
 
 
-def told_of(robot: Robot) -> list[Notice]:
+def faults_of(robot: Robot) -> list[Notice]:
     """Return what speaks against the calibration of a robot that is used all the same."""
     return [
         *(Notice(name, message) for name, message in _against(robot).items()),
@@ -404,5 +404,5 @@ def _against(robot: Robot) -> dict[str, str]:
     if robot.proof is None:
         return {}
     status = robot.proof.status
-    said = {error.code: error.message for error in robot.proof.errors}
-    return ({status: f"The fit ended as {status}."} if status in _UNSOUND else {}) | said
+    messages = {error.code: error.message for error in robot.proof.errors}
+    return ({status: f"The fit ended as {status}."} if status in _UNSOUND else {}) | messages

@@ -66,14 +66,14 @@ def read_poses(text: str) -> int | Literal["auto"]:
 
 
 def positions_of(
-    given: Array | Sequence[float] | str, robot: Robot, joints_are: JointsOf, parameter: str
+    value: Array | Sequence[float] | str, robot: Robot, joints_are: JointsOf, parameter: str
 ) -> Array | Sequence[float]:
     """Return the model's joint positions [rad or m] of what a job was given: these, or a text in deg or mm."""
-    if not isinstance(given, str):
-        return given
+    if not isinstance(value, str):
+        return value
     import numpy as np
 
-    at = np.array([read_joints(given, robot, parameter)])
+    at = np.array([read_joints(value, robot, parameter)])
     if joints_are == "controller":
         at = robot.controller.to_model(at)
     return [float(value) for value in at[0]]

@@ -73,8 +73,8 @@ def check_data(
     known |= {label for notice in closer for label, _ in notice.at}
     doubted = [suspect for suspect in suspects or () if suspect.configuration not in known]
     notices += repeated_joints_notices(data, pairs)
-    told = {suspect.configuration for suspect in doubted}
-    rigid = [suspect for suspect in rigid_suspects(data) if suspect.configuration not in told]
+    reported = {suspect.configuration for suspect in doubted}
+    rigid = [suspect for suspect in rigid_suspects(data) if suspect.configuration not in reported]
     notices += suspect_notices([*rigid, *reference_suspects(data), *doubted])
     return notices + _moved(data) + _temperatures(data)
 
@@ -91,26 +91,26 @@ def _without(data: Dataset, rows: Collection[tuple[str, str]]) -> Dataset:
     left_out = np.array([(data.labels[c], data.targets[t]) in rows for c, t in names], dtype=bool)
     references = data.references
     if references is not None:
-        there = np.isin(references.configuration, data.configuration[left_out])
-        references = replace(references, position=np.where(there[:, None], np.nan, references.position))
+        affected = np.isin(references.configuration, data.configuration[left_out])
+        references = replace(references, position=np.where(affected[:, None], np.nan, references.position))
     return replace(data, position=np.where(left_out[:, None], np.nan, data.position), references=references)
 
 
 def _closer_together(data: Dataset) -> list[Notice]:
     """Say at which configurations the targets lie as in another unit of length."""
-    found = []
-    for by, which in scaled_distances(data).items():
+    notices = []
+    for by, members in scaled_distances(data).items():
         size = f"{max(by, 1.0 / by):g} times"
-        how = f"{size} closer together" if by > 1.0 else f"{size} farther apart"
-        mine = np.flatnonzero(np.isin(data.configuration, which) & data.has_position).tolist()
-        found.append(
+        comparison = f"{size} closer together" if by > 1.0 else f"{size} farther apart"
+        rows = np.flatnonzero(np.isin(data.configuration, members) & data.has_position).tolist()
+        notices.append(
             UNIT_LENGTH(
-                f"The targets lie {how} at {named_configurations(data.labels, which)} than at the others: the "
+                f"The targets lie {comparison} at {named_configurations(data.labels, members)} than at the others: the "
                 "positions there, or those of the others, are in another unit of length. Fix their numbers.",
-                at=tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in mine),
+                at=tuple((data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in rows),
             )
         )
-    return found
+    return notices
 
 
 TEMPERATURE_UNLIKELY: Final = Rule("temperature-unlikely", "warning", "temperatures below -30 or above 80 degC")
@@ -159,13 +159,13 @@ def check_range(data: Dataset, device: Ranged) -> list[Notice]:
     beyond = np.flatnonzero(device.beyond_range(data)).tolist()
     if not beyond:
         return []
-    where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in beyond]
-    words = _listed(["/".join(one) for one in where])
+    at = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in beyond]
+    words = _listed(["/".join(reading) for reading in at])
     return [
         BEYOND_RANGE(
             f"{counted(len(beyond), 'reading')} {_are(beyond)} beyond what the device {device.name} can read "
             f"(configuration/target): {words}. It is a {device.summary}.",
-            at=tuple(where),
+            at=tuple(at),
         )
     ]
 
@@ -196,19 +196,19 @@ def suspect_notices(suspects: Sequence[Suspect]) -> list[Notice]:
             "Leave these cells empty, or measure them again.",
         ),
     }
-    told: dict[tuple[str, str], Suspect] = {}
+    firsts: dict[tuple[str, str], Suspect] = {}
     for rule in (TARGETS_SWAPPED, TARGET_MISTAKEN, OUTLIERS):
         for suspect in suspects:
             if suspect.rule == rule:
-                told.setdefault((suspect.configuration, suspect.target), suspect)
+                firsts.setdefault((suspect.configuration, suspect.target), suspect)
     notices = []
     for rule, words in advice.items():
-        mine = [s for s in dict.fromkeys(suspects) if s.rule == rule and told[s.configuration, s.target] == s]
-        if mine:
-            what, cure = words[:2] if len(mine) == 1 else words[2:]
-            named = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in mine]
-            message = f"{len(mine)} {what} (configuration/target): {_listed(named)}. {cure}"
-            notices.append(rule(message, at=tuple((s.configuration, s.target) for s in mine)))
+        of_rule = [s for s in dict.fromkeys(suspects) if s.rule == rule and firsts[s.configuration, s.target] == s]
+        if of_rule:
+            fault, cure = words[:2] if len(of_rule) == 1 else words[2:]
+            named = [f"{s.configuration}/{s.target}{f' ({s.words})' if s.words else ''}" for s in of_rule]
+            message = f"{len(of_rule)} {fault} (configuration/target): {_listed(named)}. {cure}"
+            notices.append(rule(message, at=tuple((s.configuration, s.target) for s in of_rule)))
     return notices
 
 
@@ -236,11 +236,11 @@ def _mistaken_references(data: Dataset) -> list[tuple[int, int, Suspect]]:
     points, targets = constellation(data.references), places_of(data)
     usual, off, allowed = _places(points)
     names = data.references.targets
-    found = []
+    suspects = []
     for c, t in np.argwhere(off > max(allowed, SAME_POINT)).tolist():
-        here = targets.at(c)
+        rows = targets.at(c)
         known = {
-            f"target {data.targets[n]}": targets.position[k] for k, n in enumerate(targets.target[here], here.start)
+            f"target {data.targets[n]}": targets.position[k] for k, n in enumerate(targets.target[rows], rows.start)
         }
         known |= {f"reference {n}": p for k, (n, p) in enumerate(zip(names, usual, strict=True)) if k != t}
         gaps = {name: float(np.linalg.norm(points[c, t] - place)) for name, place in known.items()}
@@ -248,10 +248,10 @@ def _mistaken_references(data: Dataset) -> list[tuple[int, int, Suspect]]:
         neighbours = [k for k in (c - 1, c + 1) if 0 <= k < data.configurations and np.isfinite(off[k, t])]
         alone = bool(neighbours) and all(off[k, t] <= allowed for k in neighbours)
         if nearest and gaps[nearest] < SAME_POINT:
-            found.append((c, t, Suspect(TARGET_MISTAKEN, data.labels[c], names[t], f"is {nearest}")))
+            suspects.append((c, t, Suspect(TARGET_MISTAKEN, data.labels[c], names[t], f"is {nearest}")))
         elif alone and off[c, t] > _FAR:
-            found.append((c, t, Suspect(OUTLIERS, data.labels[c], names[t], f"{millimetres(off[c, t])} mm off")))
-    return found
+            suspects.append((c, t, Suspect(OUTLIERS, data.labels[c], names[t], f"{millimetres(off[c, t])} mm off")))
+    return suspects
 
 
 def _places(points: Array) -> tuple[Array, Array, float]:
@@ -274,12 +274,12 @@ def _moved(data: Dataset) -> list[Notice]:
     moved: NDArray[np.bool_] = np.asarray(off > allowed)
     if not moved.any():
         return []
-    where = np.flatnonzero(moved.any(axis=1))
+    rows = np.flatnonzero(moved.any(axis=1))
     names = [n for n, is_moved in zip(data.references.targets, np.any(moved, axis=0).tolist(), strict=True) if is_moved]
     return [
         REFERENCE_MOVED(
             f"Reference points moved by up to {float(np.nanmax(off)) * 1e3:.2f} mm ({', '.join(names)}; "
-            f"{counted(len(where), 'configuration')}: {_listed([data.labels[c] for c in where])}). The robot's table "
+            f"{counted(len(rows), 'configuration')}: {_listed([data.labels[c] for c in rows])}). The robot's table "
             "or the instrument moved: where three points moved together the motion is removed, elsewhere leave these "
             "configurations out or measure them again.",
             at=tuple((data.labels[c], data.references.targets[t]) for c, t in np.argwhere(moved).tolist()),
@@ -367,7 +367,7 @@ def _misnamed(data: Dataset) -> list[Notice]:
             twice.append((t, c))
         seen[t].add(c)
     often = [t for t, at in enumerate(seen) if len(at) >= _OFTEN_SHARE * data.configurations]
-    found = []
+    hints = []
     alike = {name.casefold(): name for name in (data.targets[t] for t in often)}
     for t, at in enumerate(seen):
         if not at or len(at) > _FEW_SHARE * data.configurations:
@@ -377,22 +377,22 @@ def _misnamed(data: Dataset) -> list[Notice]:
         for other in meant:
             if not at & seen[data.targets.index(other)]:
                 labels = _listed([data.labels[c] for c in sorted(at)])
-                found.append(f"{name} at {labels}, where {other} is missing: did you mean {other}?")
+                hints.append(f"{name} at {labels}, where {other} is missing: did you mean {other}?")
                 break
     written = {_as_meant(name): name for name in reversed(data.targets)}
     for t, name in enumerate(data.targets):
         first = written[_as_meant(name)]
-        if first != name and seen[t] and not seen[t] & seen[data.targets.index(first)] and not _told(name, found):
-            found.append(f"{first} and {name} are never read together: are they one target?")
+        if first != name and seen[t] and not seen[t] & seen[data.targets.index(first)] and not _named(name, hints):
+            hints.append(f"{first} and {name} are never read together: are they one target?")
     for t, c in twice:
         lost = [data.targets[o] for o in often if c not in seen[o]]
         if len(lost) == 1:
-            found.append(f"{data.targets[t]} is there twice at {data.labels[c]}, and {lost[0]} not at all")
-    if not found:
+            hints.append(f"{data.targets[t]} is there twice at {data.labels[c]}, and {lost[0]} not at all")
+    if not hints:
         return []
     return [
         TARGET_MISSPELT(
-            f"Names look misspelt: {'; '.join(found[:_MOST_NAMED])}. A misspelt name is a target of its own. "
+            f"Names look misspelt: {'; '.join(hints[:_MOST_NAMED])}. A misspelt name is a target of its own. "
             "Correct the names."
         )
     ]
@@ -403,8 +403,8 @@ def _as_meant(name: str) -> str:
     return re.sub(r"(?<![0-9])0+(?=[0-9])", "", re.sub(r"[\s_-]", "", name.casefold()))
 
 
-def _told(name: str, found: Sequence[str]) -> bool:
-    return any(words.startswith(f"{name} at ") for words in found)
+def _named(name: str, hints: Sequence[str]) -> bool:
+    return any(words.startswith(f"{name} at ") for words in hints)
 
 
 def _are(things: Sequence[object]) -> str:

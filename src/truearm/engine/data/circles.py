@@ -152,13 +152,13 @@ def _in_plane(points: Array) -> tuple[Array, float, Array]:
     x, y = points
     A = np.column_stack([x, y, np.ones_like(x)])
     c = np.linalg.lstsq(A, x**2 + y**2, rcond=None)[0]
-    found = np.array([c[0] / 2, c[1] / 2, math.sqrt(max(c[2] + (c[0] ** 2 + c[1] ** 2) / 4, 0.0))])
+    solution = np.array([c[0] / 2, c[1] / 2, math.sqrt(max(c[2] + (c[0] ** 2 + c[1] ** 2) / 4, 0.0))])
     for _ in range(50):
-        away = points - found[:2, None]
+        away = points - solution[:2, None]
         distance = np.linalg.norm(away, axis=0)
         J = -np.column_stack([*(away / distance), np.ones_like(x)])
-        step = np.linalg.lstsq(J, found[2] - distance, rcond=None)[0]
-        found = found + step
-        if np.abs(step).max() <= 1e-14 * abs(found[2]):
+        step = np.linalg.lstsq(J, solution[2] - distance, rcond=None)[0]
+        solution = solution + step
+        if np.abs(step).max() <= 1e-14 * abs(solution[2]):
             break
-    return found[:2], float(found[2]), J
+    return solution[:2], float(solution[2]), J

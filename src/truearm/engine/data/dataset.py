@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.engine.base.arrays import axes, finite_number, number_array
 from truearm.engine.base.errors import InputError, as_html, counted, listed, short_text
-from truearm.engine.base.units import Marked, said_of
+from truearm.engine.base.units import Marked, mark_lines
 from truearm.engine.data.dataset_fields import (
     checked_joints,
     checked_kinds,
@@ -105,9 +105,9 @@ class Dataset:
             "distance": self.distance,
             "height": self.height,
         }
-        found = [
-            counted(int(np.isfinite(values).reshape(len(values), -1).all(axis=1).sum()), what)
-            for what, values in counts.items()
+        readings = [
+            counted(int(np.isfinite(values).reshape(len(values), -1).all(axis=1).sum()), name)
+            for name, values in counts.items()
             if values is not None
         ]
         known = {
@@ -121,13 +121,13 @@ class Dataset:
         }
         return short_text(
             [
-                *said_of(self.simulated_from),
+                *mark_lines(self.simulated_from),
                 f"{self.source}: {counted(self.configurations, 'configuration')} "
                 f"of {counted(len(self.joint_kinds), 'joint')}"
                 f"{' as the controller shows them' if self.joints_are == 'controller' else ''}",
                 f"{counted(len(self.targets), 'target')}: {listed(self.targets)}",
-                f"readings: {', '.join(found)}",
-                f"with: {', '.join(what for what, given in known.items() if given is not None) or 'nothing else'}",
+                f"readings: {', '.join(readings)}",
+                f"with: {', '.join(name for name, values in known.items() if values is not None) or 'nothing else'}",
             ]
         )
 
@@ -196,7 +196,7 @@ class Dataset:
         n, k, _ = p.shape
         turned = None if quaternions is None else checked_quaternions(quaternions, each)
         names = checked_labels(targets, "targets", k)
-        made = None if order is None else checked_order(order, n)
+        sequence = None if order is None else checked_order(order, n)
         return cls(
             source=source,
             labels=checked_labels(configurations, "configurations", n),
@@ -211,8 +211,8 @@ class Dataset:
             sigma=None if sigma is None else checked_sigma(sigma, "sigma", each),
             sigma_rot=None if sigma_rot is None else checked_sigma(sigma_rot, "sigma_rot", each),
             visit=None if visit is None else checked_visits(visit, each),
-            approach=None if made is None else approach_of(q, made),
-            number=None if made is None else np.asarray(made - min(int(made.min()), 1), float),
+            approach=None if sequence is None else approach_of(q, sequence),
+            number=None if sequence is None else np.asarray(sequence - min(int(sequence.min()), 1), float),
             temperature=None if temperature is None else _of_each(temperature, "temperature", n),
         )
 
@@ -283,23 +283,23 @@ class Dataset:
         chosen
             A mask ``(readings,)``, or indices of readings in the order they shall have, repeated ones too.
         """
-        kept = checked_selection(chosen, len(self.target), "chosen", "readings")
+        rows = checked_selection(chosen, len(self.target), "chosen", "readings")
 
         def part(values: Array | None) -> Array | None:
-            return None if values is None else values[kept]
+            return None if values is None else values[rows]
 
         return replace(
             self,
-            configuration=self.configuration[kept],
-            target=self.target[kept],
-            position=self.position[kept],
+            configuration=self.configuration[rows],
+            target=self.target[rows],
+            position=self.position[rows],
             quaternion=part(self.quaternion),
             distance=part(self.distance),
             height=part(self.height),
-            fixture=None if self.fixture is None else self.fixture[kept],
+            fixture=None if self.fixture is None else self.fixture[rows],
             sigma=part(self.sigma),
             sigma_rot=part(self.sigma_rot),
-            visit=None if self.visit is None else self.visit[kept],
+            visit=None if self.visit is None else self.visit[rows],
         )
 
     def of_configurations(self, chosen: Sequence[int] | Sequence[bool] | IntArray | NDArray[np.bool_]) -> Dataset:

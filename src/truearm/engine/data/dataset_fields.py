@@ -143,28 +143,28 @@ def checked_selection(chosen: object, count: int, parameter: str, things: str) -
 
 def checked_joints(joints: ArrayLike) -> Array:
     """Return joint positions, ``(n, joints)``."""
-    found = np.array(number_array(joints, "joints", ("n", "joints")))
-    if not len(found):
+    values = np.array(number_array(joints, "joints", ("n", "joints")))
+    if not len(values):
         raise InputError("there is no configuration", parameter="joints", allowed="one row or more")
-    return found
+    return values
 
 
 def checked_positions(positions: ArrayLike, count: int) -> tuple[Array, tuple[int, ...]]:
     """Return positions ``(count, targets, 3)``, NaN where a coordinate is missing, and the shape of the readings."""
-    one = axes(positions) == 2
-    found = number_array(positions, "positions", (count, 3) if one else (count, "targets", 3), missing=True)
-    found = found.reshape(count, 1 if one else found.shape[1], 3)
-    if not found.shape[1]:
+    is_single = axes(positions) == 2
+    values = number_array(positions, "positions", (count, 3) if is_single else (count, "targets", 3), missing=True)
+    values = values.reshape(count, 1 if is_single else values.shape[1], 3)
+    if not values.shape[1]:
         raise InputError("there is no target", parameter="positions", allowed="one target or more")
-    whole = np.isfinite(found).all(axis=2, keepdims=True)
-    return np.where(whole, found, np.nan), (count,) if one else found.shape[:2]
+    whole = np.isfinite(values).all(axis=2, keepdims=True)
+    return np.where(whole, values, np.nan), (count,) if is_single else values.shape[:2]
 
 
 def checked_quaternions(quaternions: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Return the orientation of each reading, ``(readings, 4)``."""
-    found = np.array(number_array(quaternions, "quaternions", (*shape, 4), missing=True)).reshape(-1, 4)
-    refuse_other_lengths(found, "quaternions")
-    return found
+    values = np.array(number_array(quaternions, "quaternions", (*shape, 4), missing=True)).reshape(-1, 4)
+    refuse_other_lengths(values, "quaternions")
+    return values
 
 
 def checked_labels(names: Sequence[str | int] | None, parameter: str, count: int) -> tuple[str, ...]:
@@ -176,14 +176,14 @@ def checked_labels(names: Sequence[str | int] | None, parameter: str, count: int
     for name in names:
         if isinstance(name, bool) or not isinstance(name, str | Integral):
             raise wrong_kind("a name must be a text", name, parameter, "texts")
-    made = tuple(str(name) for name in names)
-    _names(made, parameter)
-    return made
+    labels = tuple(str(name) for name in names)
+    _names(labels, parameter)
+    return labels
 
 
 def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
     """Return the labels, those that are there again with their number."""
-    made: list[str] = []
+    distinct: list[str] = []
     taken, last = set(labels), dict[str, int]()
     for label in labels:
         name, last[label] = label, last.get(label, 0) + 1
@@ -191,8 +191,8 @@ def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
             while (name := f"{label}#{last[label]}") in taken:
                 last[label] += 1
             taken.add(name)
-        made.append(name)
-    return tuple(made)
+        distinct.append(name)
+    return tuple(distinct)
 
 
 def drawn_from(label: str) -> str:
@@ -212,21 +212,21 @@ def checked_kinds(kinds: Sequence[str] | None, count: int) -> tuple[str, ...]:
 
 def checked_sigma(sigma: ArrayLike, parameter: str, shape: tuple[int, ...]) -> Array:
     """Return a standard deviation for each reading, from one for all, one a configuration or one for each."""
-    given = axes(sigma)
+    ndim = axes(sigma)
     if np.ma.is_masked(sigma):
         raise InputError("masked numbers cannot be used here", parameter=parameter, allowed="numbers without a mask")
-    found = number_array(sigma, parameter, shape[:given] if 0 <= given <= len(shape) else shape, missing=True)
-    if given == 0 and np.isnan(found):
+    values = number_array(sigma, parameter, shape[:ndim] if 0 <= ndim <= len(shape) else shape, missing=True)
+    if ndim == 0 and np.isnan(values):
         raise InputError("NaN cannot be used here", parameter=parameter, allowed="above 0")
-    return np.array(np.broadcast_to(found.reshape(found.shape + (1,) * (len(shape) - found.ndim)), shape)).ravel()
+    return np.array(np.broadcast_to(values.reshape(values.shape + (1,) * (len(shape) - values.ndim)), shape)).ravel()
 
 
 def checked_visits(visit: ArrayLike, shape: tuple[int, ...]) -> IntArray:
     """Return the number of the visit of each reading, from one for each configuration or for each reading."""
-    given = axes(visit)
-    found = number_array(visit, "visit", shape[:given] if 1 <= given <= len(shape) else shape, largest=_LAST)
-    whole = np.asarray(np.round(found), dtype=np.intp)
-    _refuse((found != whole) | (found < 0), found, "visit", "visits must be whole numbers", VISITS)
+    ndim = axes(visit)
+    values = number_array(visit, "visit", shape[:ndim] if 1 <= ndim <= len(shape) else shape, largest=_LAST)
+    whole = np.asarray(np.round(values), dtype=np.intp)
+    _refuse((values != whole) | (values < 0), values, "visit", "visits must be whole numbers", VISITS)
     return np.array(np.broadcast_to(whole.reshape(whole.shape + (1,) * (len(shape) - whole.ndim)), shape)).ravel()
 
 

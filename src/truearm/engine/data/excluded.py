@@ -134,7 +134,7 @@ def without_readings(data: Dataset, exclusions: Sequence[Exclusion]) -> tuple[Da
     targets = [{name: number for number, name in enumerate(part.targets)} for part in parts]
     gone = [np.zeros(len(part.target), dtype=bool) for part in parts]
     counts = []
-    said = [numbers_read(part) for part in parts] if any(exclusion.read for exclusion in exclusions) else []
+    numbers = [numbers_read(part) for part in parts] if any(exclusion.read for exclusion in exclusions) else []
     for exclusion in exclusions:
         if exclusion.configuration not in labels:
             raise InputError(
@@ -157,31 +157,31 @@ def without_readings(data: Dataset, exclusions: Sequence[Exclusion]) -> tuple[Da
         ]
         if exclusion.read and any(mask.any() for mask in masks):
             _refuse_another(
-                exclusion, tuple(said[k][row] for k, mask in enumerate(masks) for row in np.flatnonzero(mask)), data
+                exclusion, tuple(numbers[k][row] for k, mask in enumerate(masks) for row in np.flatnonzero(mask)), data
             )
-        found = 0
+        count = 0
         for meant, mask in zip(masks, gone, strict=True):
-            found += int((meant & ~mask).sum())
+            count += int((meant & ~mask).sum())
             mask |= meant
-        counts.append(found)
-        if not found:
+        counts.append(count)
+        if not count:
             raise InputError(
                 "nothing was read there, so there is nothing to exclude",
                 where=exclusion.where,
                 came=f"{exclusion.configuration}/{exclusion.target}",
                 cure="Remove the row.",
             )
-    made = _missing(data, gone[0])
+    remaining = _missing(data, gone[0])
     if data.references is not None:
-        made = replace(made, references=_missing(data.references, gone[1]))
-    return made, tuple(counts)
+        remaining = replace(remaining, references=_missing(data.references, gone[1]))
+    return remaining, tuple(counts)
 
 
 def _noted(cells: Cells, column: int, where: str) -> list[tuple[Read, ...]]:
     """Return what a column says that was read: numbers with blanks between them, readings with semicolons."""
     match = _READ.fullmatch(cells.names[column])
     unit = checked_unit(match["unit"] if match else None, LENGTH_UNITS, f"{where}, read")
-    found = []
+    readings = []
     for row, text in enumerate(cells.texts(column, missing=True)):
         place = cells.place(row, column)
         parts = [part.split() for part in text.split(";")] if text else []
@@ -193,20 +193,20 @@ def _noted(cells: Cells, column: int, where: str) -> list[tuple[Read, ...]]:
                 came=text,
                 allowed="x y z, a distance, or a height; several readings with semicolons between them",
             )
-        found.append(
+        readings.append(
             tuple(tuple(sized_si(value, unit, place) for value in words if value is not None) for words in numbers)
         )
-    return found
+    return readings
 
 
 def _in_mm(read: Iterable[Read]) -> str:
-    return "; ".join(" ".join(f"{round(value * 1e3, 6) + 0.0:.12g}" for value in one) for one in read)
+    return "; ".join(" ".join(f"{round(value * 1e3, 6) + 0.0:.12g}" for value in numbers) for numbers in read)
 
 
-def _refuse_another(one: Exclusion, there: tuple[Read, ...], data: Dataset) -> None:
+def _refuse_another(exclusion: Exclusion, present: tuple[Read, ...], data: Dataset) -> None:
     """Refuse readings that are not those that an exclusion means; their order does not matter."""
-    left = [numbers for numbers in there if numbers]
-    for wanted in one.read:
+    left = [numbers for numbers in present if numbers]
+    for wanted in exclusion.read:
         same = [n for n in left if len(n) == len(wanted) and np.allclose(n, wanted, rtol=0.0, atol=_SAME)]
         if not same:
             break
@@ -216,22 +216,22 @@ def _refuse_another(one: Exclusion, there: tuple[Read, ...], data: Dataset) -> N
             return
     raise InputError(
         "another reading stands here in the measurements than the one that was excluded",
-        where=one.where,
-        came=f"{_in_mm(n for n in there if n) or 'no'} mm in {data.source}",
-        allowed=f"{_in_mm(one.read)} mm for {one.configuration}/{one.target}",
+        where=exclusion.where,
+        came=f"{_in_mm(n for n in present if n) or 'no'} mm in {data.source}",
+        allowed=f"{_in_mm(exclusion.read)} mm for {exclusion.configuration}/{exclusion.target}",
         cure="Give the file of excluded readings that was made for these measurements, or none.",
     )
 
 
-def _meant(part: Dataset, configuration: int, target: int, one: Exclusion) -> NDArray[np.bool_]:
+def _meant(part: Dataset, configuration: int, target: int, exclusion: Exclusion) -> NDArray[np.bool_]:
     """Return which readings of a part an exclusion means, ``(readings,)``."""
     meant = (part.configuration == configuration) & (part.target == target) & part.has_reading
-    if one.visit:
+    if exclusion.visit:
         visits = np.ones(len(part.target), np.intp) if part.visit is None else part.visit
-        meant &= np.array([str(int(visit)) == one.visit for visit in visits])
-    if one.fixture:
+        meant &= np.array([str(int(visit)) == exclusion.visit for visit in visits])
+    if exclusion.fixture:
         names = np.array([*part.fixtures, ""])
-        meant &= names[part.against] == one.fixture
+        meant &= names[part.against] == exclusion.fixture
     return np.asarray(meant)
 
 
@@ -239,9 +239,9 @@ def _missing(part: Dataset, gone: NDArray[np.bool_]) -> Dataset:
     def without(values: Array | None) -> Array | None:
         if values is None:
             return None
-        kept = values.copy()
-        kept[gone] = np.nan
-        return kept
+        remaining = values.copy()
+        remaining[gone] = np.nan
+        return remaining
 
     position = without(part.position)
     assert position is not None

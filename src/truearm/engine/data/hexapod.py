@@ -218,8 +218,8 @@ def tool_cups(
     t1 = tripod((feet[i], feet[j], feet[k]), legs[:3], hand, names[:3])
     t2 = tripod((feet[i], feet[j], t1), (legs[3], legs[4], t12), hand * second_side, (*names[3:5], name12))
     t3 = tripod((t2, feet[j], t1), (t23, legs[5], t31), hand * third_side, (name23, names[5], name31))
-    found = {first: t1, second: t2, third: t3}
-    return np.array([found[cup] for cup in range(3)])
+    places = {first: t1, second: t2, third: t3}
+    return np.array([places[cup] for cup in range(3)])
 
 
 def leg_lengths(design: Design, base_cups: Array, tool_cups: Array) -> Array:
@@ -323,31 +323,31 @@ def distance(a: HexapodPose, b: HexapodPose) -> tuple[float, float]:
 
 
 def near_equal(
-    found: Sequence[HexapodPose], angle: float = NEAR_ANGLE, apart: float = NEAR_DISTANCE
+    hexapod_poses: Sequence[HexapodPose], angle: float = NEAR_ANGLE, apart: float = NEAR_DISTANCE
 ) -> tuple[tuple[int, int], ...]:
     """Return the numbers of poses that are nearer to each other than both `angle` [rad] and `apart` [m].
 
     The limits matter: with Nubiola's fixture the groups lie at 8.35 deg with 11.1, 27.0 and 35.7 mm, and the next at
     30.1 deg with 39.8 mm.
     """
-    R = np.array([pose.rotation for pose in found])
-    p = np.array([pose.position for pose in found])
-    i, j = np.triu_indices(len(found), 1)
+    R = np.array([pose.rotation for pose in hexapod_poses])
+    p = np.array([pose.position for pose in hexapod_poses])
+    i, j = np.triu_indices(len(hexapod_poses), 1)
     turned = np.linalg.norm(rotation_vector(np.swapaxes(R[i], 1, 2) @ R[j]), axis=1)
     near = (turned < angle) & (np.linalg.norm(p[i] - p[j], axis=1) < apart)
     pairs = zip(i[near].tolist(), j[near].tolist(), strict=True)
-    return tuple((found[a].number, found[b].number) for a, b in pairs)
+    return tuple((hexapod_poses[a].number, hexapod_poses[b].number) for a, b in pairs)
 
 
 def distinct(
-    found: Sequence[HexapodPose], angle: float = NEAR_ANGLE, apart: float = NEAR_DISTANCE
+    hexapod_poses: Sequence[HexapodPose], angle: float = NEAR_ANGLE, apart: float = NEAR_DISTANCE
 ) -> tuple[HexapodPose, ...]:
     """Return the poses without the first of every near-equal pair that is still whole, in the order of their numbers.
 
     Of Nubiola's pairs that leaves out what Figure 3.6 crosses out.
     """
     dropped: set[int] = set()
-    for first, second in near_equal(found, angle, apart):
+    for first, second in near_equal(hexapod_poses, angle, apart):
         if second not in dropped:
             dropped.add(first)
-    return tuple(pose for pose in found if pose.number not in dropped)
+    return tuple(pose for pose in hexapod_poses if pose.number not in dropped)

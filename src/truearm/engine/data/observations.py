@@ -52,11 +52,11 @@ class Sighting:
         if self.fixture is None:
             return self._by_scale(moved, names)
         arm = self.target.position[..., self.configurations] - self.fixture.position
-        mine = [k for k, name in enumerate(names) if name in self.fixture.places]
-        places = [self.fixture.places[names[k]] for k in mine]
+        columns = [k for k, name in enumerate(names) if name in self.fixture.places]
+        places = [self.fixture.places[names[k]] for k in columns]
         moved = moved.copy()
         for k, slide, turn in zip(
-            mine, self.fixture.position_jacobian(places), self.fixture.orientation_jacobian(places), strict=True
+            columns, self.fixture.position_jacobian(places), self.fixture.orientation_jacobian(places), strict=True
         ):
             moved[k] -= slide + cross(*np.broadcast_arrays(turn, arm))
         return self._by_scale(self._turned(moved, at=1), names)
@@ -66,10 +66,10 @@ class Sighting:
         moved = velocity[..., self.configurations]
         if self.fixture is None:
             return moved
-        mine = [k for k, name in enumerate(names) if name in self.fixture.places]
+        columns = [k for k, name in enumerate(names) if name in self.fixture.places]
         moved = moved.copy()
         for k, turn in zip(
-            mine, self.fixture.orientation_jacobian([self.fixture.places[names[k]] for k in mine]), strict=True
+            columns, self.fixture.orientation_jacobian([self.fixture.places[names[k]] for k in columns]), strict=True
         ):
             moved[k] -= turn
         return self._turned(moved, at=1)
@@ -259,10 +259,10 @@ def compared(data: Dataset) -> Iterator[tuple[str, str | None, Observation, NDAr
     """
     against = data.against
     for index, name in enumerate(data.targets):
-        mine = data.target == index
-        for other in np.unique(against[mine]).tolist():
+        of_target = data.target == index
+        for other in np.unique(against[of_target]).tolist():
             fixture = data.fixtures[other] if other >= 0 else None
             for observation in OBSERVATIONS:
-                readings = np.flatnonzero(mine & (against == other) & observation.present(data))
+                readings = np.flatnonzero(of_target & (against == other) & observation.present(data))
                 if len(readings):
                     yield name, fixture, observation, readings

@@ -57,16 +57,16 @@ def lengths_noticed(data: Dataset, factor: Array) -> tuple[str, tuple[tuple[str,
     Args:
         factor: What makes each reading right, ``(readings,)``; one of those of `LENGTH_FACTORS` somewhere.
     """
-    said = []
+    parts = []
     for by, words in LENGTH_FACTORS:
-        mine = factor == by
-        if mine.any():
-            said.append(f"the positions at {_names(data, mine)} are {words}")
+        selected = factor == by
+        if selected.any():
+            parts.append(f"the positions at {_names(data, selected)} are {words}")
     at = tuple(
         (data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in np.flatnonzero(factor != 1.0)
     )
-    told = "; ".join(said)
-    return f"{told[0].upper()}{told[1:]}; those of the others are not. Fix the numbers of these rows", at
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}; those of the others are not. Fix the numbers of these rows", at
 
 
 def length_notice(data: Dataset, factor: Array) -> Notice:
@@ -75,30 +75,30 @@ def length_notice(data: Dataset, factor: Array) -> Notice:
     return UNIT_LENGTH(f"{words}.", at=at)
 
 
-def _names(data: Dataset, mine: NDArray[np.bool_]) -> str:
+def _names(data: Dataset, selected: NDArray[np.bool_]) -> str:
     """Name readings: a configuration all of whose positions are among them by its label alone."""
     read = data.has_position
-    whole = np.setdiff1d(data.configuration[mine], data.configuration[read & ~mine])
-    single = np.flatnonzero(mine & ~np.isin(data.configuration, whole)).tolist()
-    found = []
+    whole = np.setdiff1d(data.configuration[selected], data.configuration[read & ~selected])
+    single = np.flatnonzero(selected & ~np.isin(data.configuration, whole)).tolist()
+    parts = []
     if len(whole):
-        found.append(named_configurations(data.labels, whole))
+        parts.append(named_configurations(data.labels, whole))
     if single:
         names = [f"{data.labels[data.configuration[r]]}/{data.targets[data.target[r]]}" for r in single]
-        found.append(f"{_listed([(name, 1) for name in names], 'reading')} (configuration/target)")
-    return " and at ".join(found)
+        parts.append(f"{_listed([(name, 1) for name in names], 'reading')} (configuration/target)")
+    return " and at ".join(parts)
 
 
-def named_configurations(labels: Sequence[str], which: IntArray) -> str:
+def named_configurations(labels: Sequence[str], configurations: IntArray) -> str:
     """Name configurations: ``configuration 5``, ``configurations 5 to 10, 12``."""
-    what = "configuration" if len(which) == 1 else "configurations"
-    return f"{what} {_listed(_in_runs(labels, which), 'configuration')}"
+    noun = "configuration" if len(configurations) == 1 else "configurations"
+    return f"{noun} {_listed(_in_runs(labels, configurations), 'configuration')}"
 
 
-def _in_runs(labels: Sequence[str], which: IntArray) -> list[tuple[str, int]]:
+def _in_runs(labels: Sequence[str], configurations: IntArray) -> list[tuple[str, int]]:
     """Return names of configurations and how many each is of: those numbered one after the other are one."""
-    found: list[tuple[str, int]] = []
-    names = [labels[c] for c in which.tolist()]
+    runs: list[tuple[str, int]] = []
+    names = [labels[c] for c in configurations.tolist()]
     first = 0
     while first < len(names):
         end = first + 1
@@ -106,16 +106,16 @@ def _in_runs(labels: Sequence[str], which: IntArray) -> list[tuple[str, int]]:
             end += 1
         if end - first < _LEAST_RUN:
             end = first + 1
-        found.append((names[first] if end == first + 1 else f"{names[first]} to {names[end - 1]}", end - first))
+        runs.append((names[first] if end == first + 1 else f"{names[first]} to {names[end - 1]}", end - first))
         first = end
-    return found
+    return runs
 
 
 def _listed(runs: Sequence[tuple[str, int]], thing: str) -> str:
     """List names, the first ones of very many."""
-    rest = sum(count for _, count in runs[_MOST_NAMED:])
+    left = sum(count for _, count in runs[_MOST_NAMED:])
     first = ", ".join(name for name, _ in runs[:_MOST_NAMED])
-    return f"{first} and {counted(rest, f'more {thing}')}" if rest else first
+    return f"{first} and {counted(left, f'more {thing}')}" if left else first
 
 
 # Where targets were read, configuration by configuration: as many places as readings, and no table of both.
@@ -135,27 +135,27 @@ class Places:
 
     def of(self, configuration: int, target: int) -> Array | None:
         """Return the position of a target at a configuration [m], ``(3,)``; None where it was not read."""
-        here = self.at(configuration)
-        found = here.start + int(np.searchsorted(self.target[here], target))
-        return self.position[found] if found < here.stop and self.target[found] == target else None
+        rows = self.at(configuration)
+        row = rows.start + int(np.searchsorted(self.target[rows], target))
+        return self.position[row] if row < rows.stop and self.target[row] == target else None
 
     def usual(self) -> Array:
         """Return the median place of each target [m], ``(targets, 3)``; NaN where it was not read."""
-        found = np.full((self.targets, 3), np.nan)
+        usual = np.full((self.targets, 3), np.nan)
         for axis in range(3):
             names, medians = grouped_medians(self.target, self.position[:, axis])
-            found[names, axis] = medians
-        return found
+            usual[names, axis] = medians
+        return usual
 
 
 def places_of(data: Dataset) -> Places:
     """Return where the targets of a dataset were read in the instrument's own frame."""
-    there = np.flatnonzero(data.has_position)
-    both = data.configuration[there] * max(len(data.targets), 1) + data.target[there]
+    present = np.flatnonzero(data.has_position)
+    both = data.configuration[present] * max(len(data.targets), 1) + data.target[present]
     each, place, count = np.unique(both, return_inverse=True, return_counts=True)
     position = np.empty((len(each), 3))
     for axis in range(3):
-        position[:, axis] = np.bincount(place, data.position[there, axis], len(each)) / count
+        position[:, axis] = np.bincount(place, data.position[present, axis], len(each)) / count
     configuration, target = np.divmod(each, max(len(data.targets), 1))
     return Places(configuration, target, position, len(data.targets))
 
@@ -225,7 +225,7 @@ _WRONG_SHARE: Final = 0.75
 _EXCHANGED: Final = (3, 6)
 #: An exchange must change a distance by so many times what distances may be off: exchanged names of an equilateral
 #: triangle change none, and explain nothing that a wrong reading does not.
-_TOLD_APART: Final = 1.5
+_DISTINCT: Final = 1.5
 #: A distance is that of another unit if it is as long as usual in that unit within this share.
 _SAME_LENGTH: Final = 0.01
 #: One wrong reading explains a configuration if all distances without it are off by less than this share of what they
@@ -260,8 +260,8 @@ class _Distances:
     def usual_between(self, targets: IntArray) -> Array:
         """Return the usual distances of a few targets, all of them read together once, ``(n, n)``."""
         low, high = np.minimum(targets[:, None], targets), np.maximum(targets[:, None], targets)
-        found = np.minimum(np.searchsorted(self.pairs, low * self.places.targets + high), len(self.pairs) - 1)
-        return np.where(low == high, 0.0, self.usual[found])
+        index = np.minimum(np.searchsorted(self.pairs, low * self.places.targets + high), len(self.pairs) - 1)
+        return np.where(low == high, 0.0, self.usual[index])
 
 
 def rigid_suspects(data: Dataset) -> list[Suspect]:
@@ -271,18 +271,18 @@ def rigid_suspects(data: Dataset) -> list[Suspect]:
     the next few alone, so that time and memory grow with the readings and not with their square.
     """
     places = places_of(data)
-    one, other = _compared(places)
-    if not len(one):
+    first, second = _compared(places)
+    if not len(first):
         return []
-    apart = np.linalg.norm(places.position[one] - places.position[other], axis=1)
-    pair = places.target[one] * places.targets + places.target[other]
+    apart = np.linalg.norm(places.position[first] - places.position[second], axis=1)
+    pair = places.target[first] * places.targets + places.target[second]
     pairs, usual = grouped_medians(pair, apart)
     off = np.abs(apart - usual[np.searchsorted(pairs, pair)])
     allowed = max(UNMOVED, DEVIATIONS * 1.4826 * float(np.median(off)))
-    doubtful = np.unique(places.configuration[one[off > allowed]]).tolist()
+    doubtful = np.unique(places.configuration[first[off > allowed]]).tolist()
     if not doubtful:
         return []
-    count, ends, twice = len(places.target), np.concatenate([one, other]), np.concatenate([off, off])
+    count, ends, twice = len(places.target), np.concatenate([first, second]), np.concatenate([off, off])
     compared = np.maximum(np.bincount(ends, minlength=count), 1)
     share = np.asarray(np.bincount(ends[twice > allowed], minlength=count) / compared, dtype=np.float64)
     most, total = np.zeros(count), np.asarray(np.bincount(ends, twice, count), dtype=np.float64)
@@ -302,18 +302,18 @@ def scaled_distances(data: Dataset) -> dict[float, IntArray]:
         Their indices by the factor that makes them usual, of those of `LENGTH_FACTORS`.
     """
     places = places_of(data)
-    one, other = _compared(places)
-    if not len(one):
+    first, second = _compared(places)
+    if not len(first):
         return {}
-    apart = np.linalg.norm(places.position[one] - places.position[other], axis=1)
-    pairs, usual = grouped_medians(pair := places.target[one] * places.targets + places.target[other], apart)
+    apart = np.linalg.norm(places.position[first] - places.position[second], axis=1)
+    pairs, usual = grouped_medians(pair := places.target[first] * places.targets + places.target[second], apart)
     usual = usual[np.searchsorted(pairs, pair)]
-    where, allowed = places.configuration[one], _SAME_LENGTH * usual
-    found = {}
+    configurations, allowed = places.configuration[first], _SAME_LENGTH * usual
+    by_scale = {}
     for by, _ in LENGTH_FACTORS:
         other_unit = (np.abs(by * apart - usual) <= allowed) & (usual > 0.0)
-        found[by] = np.setdiff1d(where[other_unit], where[~other_unit])
-    return {by: which for by, which in found.items() if len(which)}
+        by_scale[by] = np.setdiff1d(configurations[other_unit], configurations[~other_unit])
+    return {by: numbers for by, numbers in by_scale.items() if len(numbers)}
 
 
 def _compared(places: Places) -> tuple[IntArray, IntArray]:
@@ -325,25 +325,25 @@ def _compared(places: Places) -> tuple[IntArray, IntArray]:
         pairs.append((first, first + step))
     if not pairs:
         return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-    one, other = zip(*pairs, strict=True)
-    return np.concatenate(one), np.concatenate(other)
+    firsts, seconds = zip(*pairs, strict=True)
+    return np.concatenate(firsts), np.concatenate(seconds)
 
 
 def _blamed(data: Dataset, distances: _Distances, c: int, known: dict[str, Array]) -> list[Suspect]:
     places, allowed = distances.places, distances.allowed
-    mine = places.at(c)
-    here, seen, label, names = places.position[mine], places.target[mine], data.labels[c], data.targets
+    rows = places.at(c)
+    points, seen, label, names = places.position[rows], places.target[rows], data.labels[c], data.targets
     alone = np.ones(len(seen), dtype=bool)
     if _EXCHANGED[0] <= len(seen) <= _EXCHANGED[1]:
         usual = distances.usual_between(seen)
-        swap = _swap(here, usual, allowed)
+        swap = _swap(points, usual, allowed)
         if swap:
             return [Suspect(TARGETS_SWAPPED, label, names[seen[a]], f"is target {names[seen[b]]}") for a, b in swap]
-        alone = _off_without_each(here, usual) <= _EXPLAINED * allowed
-    wrong: NDArray[np.bool_] = distances.share[mine] >= _WRONG_SHARE
+        alone = _off_without_each(points, usual) <= _EXPLAINED * allowed
+    wrong: NDArray[np.bool_] = distances.share[rows] >= _WRONG_SHARE
     if len(seen) > 2 and wrong.sum() > 1:
-        wrong = np.arange(len(seen)) == np.argmax(np.where(wrong, distances.total[mine], -1.0))
-    doubted = wrong if wrong.any() else distances.most[mine] > allowed
+        wrong = np.arange(len(seen)) == np.argmax(np.where(wrong, distances.total[rows], -1.0))
+    doubted = wrong if wrong.any() else distances.most[rows] > allowed
     if (doubted & alone).any():
         doubted &= alone
     others = np.flatnonzero(~doubted)
@@ -351,12 +351,12 @@ def _blamed(data: Dataset, distances: _Distances, c: int, known: dict[str, Array
     for k in np.flatnonzero(doubted).tolist():
         name, near = names[seen[k]], dict(known)
         if len(others):
-            nearest = others[np.argmin(np.linalg.norm(here[others] - here[k], axis=1))]
-            near[f"target {names[seen[nearest]]}"] = here[nearest]
+            nearest = others[np.argmin(np.linalg.norm(points[others] - points[k], axis=1))]
+            near[f"target {names[seen[nearest]]}"] = points[nearest]
         before = places.of(c - 1, int(seen[k]))
         if before is not None:
             near[f"target {name} at the configuration before"] = before
-        suspects.append(suspect(here[k], label, name, float(distances.most[mine][k]), near))
+        suspects.append(suspect(points[k], label, name, float(distances.most[rows][k]), near))
     return suspects
 
 
@@ -376,22 +376,22 @@ def suspect(point: Array, label: str, target: str, size: float, known: dict[str,
     return Suspect(OUTLIERS, label, target, f"{millimetres(size)} mm off")
 
 
-def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
+def _swap(seen: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
     """Return the exchange of names under which all distances hold best; nothing if there is none.
 
     An exchange that hardly changes the usual distances explains nothing that a wrong reading does not.
 
     Args:
-        here: Readings of a configuration [m], ``(n, 3)``.
+        seen: Readings of a configuration [m], ``(n, 3)``.
         usual: Distances of their targets [m], ``(n, n)``.
     """
-    orders = np.array(list(permutations(range(len(here)))))[1:]
+    orders = np.array(list(permutations(range(len(seen)))))[1:]
     changed = np.abs(usual[orders[:, :, None], orders[:, None]] - usual).max(axis=(1, 2))
-    orders = orders[changed > _TOLD_APART * allowed]
+    orders = orders[changed > _DISTINCT * allowed]
     if not len(orders):
         return []
-    orders = orders[np.argsort((orders != np.arange(len(here))).sum(axis=1), kind="stable")]
-    points = here[orders]
+    orders = orders[np.argsort((orders != np.arange(len(seen))).sum(axis=1), kind="stable")]
+    points = seen[orders]
     misfit = np.abs(np.linalg.norm(points[:, :, None] - points[:, None], axis=3) - usual).max(axis=(1, 2))
     best = int(np.argmin(misfit))
     if misfit[best] > allowed:
@@ -400,16 +400,16 @@ def _swap(here: Array, usual: Array, allowed: float) -> list[tuple[int, int]]:
     return [(b, a) for a, b in enumerate(orders[best].tolist()) if a != b]
 
 
-def _off_without_each(here: Array, usual: Array) -> Array:
+def _off_without_each(points: Array, usual: Array) -> Array:
     """Return how far off distances are among all readings but one [m], for each one, ``(n,)``.
 
     Args:
-        here: Readings of a configuration [m], ``(n, 3)``.
+        points: Readings of a configuration [m], ``(n, 3)``.
         usual: Distances of their targets [m], ``(n, n)``.
     """
-    off = np.abs(np.linalg.norm(here[:, None] - here, axis=2) - usual)
-    kept = ~np.eye(len(here), dtype=bool)
-    return np.array([off[np.ix_(others, others)].max() for others in kept])
+    off = np.abs(np.linalg.norm(points[:, None] - points, axis=2) - usual)
+    masks = ~np.eye(len(points), dtype=bool)
+    return np.array([off[np.ix_(others, others)].max() for others in masks])
 
 
 def fixed_points(data: Dataset) -> dict[str, Array]:

@@ -142,10 +142,10 @@ def without_table_motion(data: Dataset) -> Dataset:
     position, oriented = data.position.copy(), data.has_orientation
     quaternion = None if data.quaternion is None else data.quaternion.copy()
     moved = False
-    for mine, R, shift, _, _ in _motions(data):
-        position[mine] = position[mine] @ R.T + shift
+    for rows, R, shift, _, _ in _motions(data):
+        position[rows] = position[rows] @ R.T + shift
         if quaternion is not None:
-            turned = mine[oriented[mine]]
+            turned = rows[oriented[rows]]
             quaternion[turned] = quaternion_from_rotation(R @ rotation_from_quaternion(quaternion[turned]))
         moved = True
     return replace(data, position=position, quaternion=quaternion) if moved else data
@@ -154,8 +154,8 @@ def without_table_motion(data: Dataset) -> Dataset:
 def table_motion(data: Dataset) -> TableMotion | None:
     """Return what the table's motion did, of readings from which it was taken out; None where it was not measured."""
     moved, noise, freedom, spread, read = 0.0, 0.0, 0, 0.0, 0
-    for mine, R, shift, usual, misfit in _motions(data):
-        places = data.position[mine][data.has_position[mine]]
+    for rows, R, shift, usual, misfit in _motions(data):
+        places = data.position[rows][data.has_position[rows]]
         noise += float(misfit.ravel() @ misfit.ravel())
         freedom += misfit.size - 6
         if not len(places):
@@ -184,15 +184,15 @@ def _motions(data: Dataset) -> Iterator[tuple[NDArray[np.intp], Array, Array, Ar
     points = clean_references(data)
     if points is None:
         return
-    there = np.asarray(np.isfinite(points).all(axis=2))
-    complete = np.asarray(there.all(axis=1))
+    present = np.asarray(np.isfinite(points).all(axis=2))
+    complete = np.asarray(present.all(axis=1))
     if points.shape[1] < 3 or not complete.any():
         return
     usual = points[complete].mean(axis=0)
     order = np.argsort(data.configuration, kind="stable")
     first = np.searchsorted(data.configuration[order], np.arange(data.configurations + 1)).tolist()
-    for c in np.flatnonzero(there.sum(axis=1) >= 3).tolist():
-        seen = there[c]
+    for c in np.flatnonzero(present.sum(axis=1) >= 3).tolist():
+        seen = present[c]
         R, shift = rigid_motion(points[c, seen], usual[seen])
         misfit = points[c, seen] @ R.T + shift - usual[seen]
         if np.linalg.norm(misfit, axis=1).max() <= _UNMOVED:

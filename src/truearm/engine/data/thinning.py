@@ -20,12 +20,18 @@ _SAME_ANGLE: Final = math.radians(0.01)
 _SAME_LENGTH: Final = 1e-5
 
 
+JUDGED_IN_PART: Final = Rule(
+    "judged-in-part",
+    "note",
+    "the data are large: a part of them, evenly spaced, was compared with the robot, is what the fit was judged by, or "
+    "is what `auto` chose the model by; the [limit](data.md#limits) of derivatives says how large",
+)
 DUPLICATES: Final = Rule("duplicates", "warning", "readings that repeat another one to the last digit", gravity=2)
 
 
 def check_duplicates(data: Dataset) -> list[Notice]:
     """Say which readings repeat another one to the last digit."""
-    found, where = [], list[tuple[str, str]]()
+    pairs, at = [], list[tuple[str, str]]()
     for part in [data] if data.references is None else [data, data.references]:
         first: dict[tuple[int, bytes], int] = {}
         for reading in np.flatnonzero(part.has_position).tolist():
@@ -34,16 +40,16 @@ def check_duplicates(data: Dataset) -> list[Notice]:
             a, b = (part.labels[part.configuration[r]] for r in (other, reading))
             # A configuration that was drawn twice for a bootstrap counts twice because it shall.
             if other != reading and (a == b or drawn_from(a) != drawn_from(b)):
-                found.append(f"{part.targets[key[0]]} at {a} and {b}")
-                where += [(a, part.targets[key[0]]), (b, part.targets[key[0]])]
-    if not found:
+                pairs.append(f"{part.targets[key[0]]} at {a} and {b}")
+                at += [(a, part.targets[key[0]]), (b, part.targets[key[0]])]
+    if not pairs:
         return []
     return [
         DUPLICATES(
-            f"{counted(len(found), 'reading')} repeat{'s' if len(found) == 1 else ''} another one to the last digit "
-            f"(target at configurations): {listed(found)}. Rows were copied, or the instrument stood still: remove "
-            f"{'it, it counts' if len(found) == 1 else 'them, they count'} twice.",
-            at=tuple(dict.fromkeys(where)),
+            f"{counted(len(pairs), 'reading')} repeat{'s' if len(pairs) == 1 else ''} another one to the last digit "
+            f"(target at configurations): {listed(pairs)}. Rows were copied, or the instrument stood still: remove "
+            f"{'it, it counts' if len(pairs) == 1 else 'them, they count'} twice.",
+            at=tuple(dict.fromkeys(at)),
         )
     ]
 
@@ -96,9 +102,9 @@ def repeated_joints(data: Dataset) -> list[tuple[str, str]]:
     readings = np.flatnonzero(data.has_position)
     readings = readings[np.argsort(data.configuration[readings], kind="stable")]
     of = data.configuration[readings]
-    what = np.column_stack([posture[of], data.target[readings]])
-    _, first, which = np.unique(what, axis=0, return_index=True, return_inverse=True)
-    other = first[which.reshape(-1)]
+    keys = np.column_stack([posture[of], data.target[readings]])
+    _, first, key_of_row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    other = first[key_of_row.reshape(-1)]
     place = data.position[readings]
     apart = (of != of[other]) & (np.linalg.norm(place - place[other], axis=1) > _LARGEST_CHANGE)
     pairs: dict[int, int] = {}
@@ -154,9 +160,9 @@ def thinned(data: Dataset, parameters: int, most: int) -> Dataset | None:
     beside = parameters + PARAMETERS_OF_A_PLACE * (1 + len(data.fixtures))
     if equations_of(data) * (beside + PARAMETERS_OF_A_PLACE * len(data.targets)) <= most:
         return data
-    there = data.has_reading
+    present = data.has_reading
     of, _ = np.divmod(
-        np.unique(data.target[there] * data.configurations + data.configuration[there]), data.configurations
+        np.unique(data.target[present] * data.configurations + data.configuration[present]), data.configurations
     )
     times = np.bincount(of, minlength=len(data.targets))
     often = np.argsort(-times, kind="stable")[:_MOST_TARGETS]
@@ -165,23 +171,23 @@ def thinned(data: Dataset, parameters: int, most: int) -> Dataset | None:
         return None
     number = np.full(len(data.targets), -1, dtype=np.intp)
     number[often] = np.arange(len(often))
-    some = data.of_readings(there & (number[data.target] >= 0))
+    some = data.of_readings(present & (number[data.target] >= 0))
     some = replace(some, target=number[some.target], targets=tuple(data.targets[t] for t in often.tolist()))
     seen = np.unique(some.configuration)
     each = equations_of(some) * (beside + PARAMETERS_OF_A_PLACE * len(often)) / len(seen)
-    room = max(int(most / each), _FEWEST_CONFIGURATIONS)
-    if room >= len(seen):
+    largest = max(int(most / each), _FEWEST_CONFIGURATIONS)
+    if largest >= len(seen):
         return some.of_configurations(seen)
-    return some.of_configurations(seen[np.linspace(0, len(seen) - 1, room).astype(np.intp)])
+    return some.of_configurations(seen[np.linspace(0, len(seen) - 1, largest).astype(np.intp)])
 
 
 def evenly(data: Dataset, parameters: int, most: int) -> Dataset:
     """Return data of no more than `most` equations times parameters: those given, or configurations evenly spaced."""
-    n = room = data.configurations
+    n = size = data.configurations
     part = data
-    while room > 1 and (count := equations_of(part) * parameters) > most:
-        room = max(1, min(room - 1, room * most // count))
-        part = data.of_configurations(np.linspace(0, n - 1, room).round().astype(np.intp))
+    while size > 1 and (count := equations_of(part) * parameters) > most:
+        size = max(1, min(size - 1, size * most // count))
+        part = data.of_configurations(np.linspace(0, n - 1, size).round().astype(np.intp))
     return part
 
 

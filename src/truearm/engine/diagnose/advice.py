@@ -81,8 +81,8 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
                 "two points, or a ballbar."
             )
         if fit.unobservable_combinations:
-            held = "; ".join(fit.unobservable_combinations)
-            words += f" Unobservable combinations of parameters, held at nominal values: {held}."
+            unobservable = "; ".join(fit.unobservable_combinations)
+            words += f" Unobservable combinations of parameters, held at nominal values: {unobservable}."
         notices.append(CLOSED_LOOP(words))
     if fit.at_bound:
         notices.append(AT_BOUND(f"Parameters at a bound: {', '.join(fit.at_bound)}. {Status.AT_BOUND.advice}"))
@@ -213,7 +213,7 @@ EFFECTS_UNINFORMED: Final = Rule(
 
 def _check_effects(fit: Fit) -> list[Notice]:
     """Say which joint effects the data know nothing about, and which came out as no spring can be."""
-    robot, found = fit.robot, []
+    robot, notices = fit.robot, []
     idle = [
         effect.name
         for effect in robot.effects
@@ -223,7 +223,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         and all(robot.values[p.name] == p.value for p in effect.parameters)
     ]
     if idle:
-        found.append(
+        notices.append(
             EFFECTS_IDLE(
                 f"The robot file has the joint effects {', '.join(idle)} with all values zero, and the model "
                 f"{fit.model.name} does not free them. Add `effects={idle[0]}`, or take them out of the file."
@@ -235,13 +235,13 @@ def _check_effects(fit: Fit) -> list[Notice]:
     unknown = [name for name in own if fit.parameter_status(name) == "uninformed"]
     unknown += [r.dropped for r in fit.redundancies if r.dropped in effects]
     if any(effect.loaded for effect in robot.effects) and not has_weight(robot):
-        found.append(
+        notices.append(
             NO_LOADS(
                 "The robot has no link masses and no payload, so nothing loads its joints. Compliance cannot be found."
             )
         )
     elif unknown:
-        found.append(
+        notices.append(
             EFFECTS_UNINFORMED(
                 f"The data say nothing about {', '.join(unknown)}. Either nothing loads these joints that way (gravity "
                 "does not turn a vertical axis), or there are too few configurations for so many effects. The values "
@@ -255,7 +255,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         if joint.bearing is None and any(name in tilting and name.endswith(f"_{number}") for name in own)
     ]
     if assumed:
-        found.append(
+        notices.append(
             BEARING_ASSUMED(
                 f"The robot file does not say where on their axes the bearings of {listed(assumed)} lie. They are "
                 "taken at the joints' origins, and so are the moments that tilt them. If drawings tell, enter "
@@ -264,7 +264,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         )
     vague = [name for name in own if name not in unknown and (robot.parameters[name].informed or 1.0) < _LEAST_INFORMED]
     if len(vague) > _LARGEST_UNINFORMED_SHARE * len(own):
-        found.append(
+        notices.append(
             TOO_MANY_EFFECTS(
                 f"Of {len(own)} parameters of joint effects, {len(vague)} rest more on their priors than on the data: "
                 f"{', '.join(vague[:8])}{' and others' if len(vague) > 8 else ''}. There are too few configurations "
@@ -273,13 +273,13 @@ def _check_effects(fit: Fit) -> list[Notice]:
         )
     soft = _negative(fit)
     if soft:
-        found.append(
+        notices.append(
             NEGATIVE_EFFECT(
                 f"{', '.join(soft)} came out negative, as no spring and no play is: masses, payload or gravity may be "
                 "wrong, or the parameter stands for something else that the model lacks."
             )
         )
-    return found
+    return notices
 
 
 def _negative(fit: Fit) -> list[str]:
@@ -294,8 +294,8 @@ def _negative(fit: Fit) -> list[str]:
         if of[name].group in NON_NEGATIVE and fit.parameter_status(name) == "identified"
     ]
     names, spread = fit.free.names, fit.covariance
-    found = {i: names[i] for i in places if of[names[i]].value < -_NEGATIVE_DEVIATIONS * math.sqrt(spread[i, i])}
-    for i, j in combinations([place for place in places if place not in found], 2):
+    negative = {i: names[i] for i in places if of[names[i]].value < -_NEGATIVE_DEVIATIONS * math.sqrt(spread[i, i])}
+    for i, j in combinations([place for place in places if place not in negative], 2):
         total, variance = of[names[i]].value + of[names[j]].value, spread[i, i] + spread[j, j] + 2.0 * spread[i, j]
         better_known = variance < min(spread[i, i], spread[j, j])
         if (
@@ -303,5 +303,5 @@ def _negative(fit: Fit) -> list[str]:
             and better_known
             and total < -_NEGATIVE_DEVIATIONS * math.sqrt(variance)
         ):
-            found[i] = f"the sum of {names[i]} and {names[j]}"
-    return [found[place] for place in sorted(found)]
+            negative[i] = f"the sum of {names[i]} and {names[j]}"
+    return [negative[place] for place in sorted(negative)]

@@ -22,8 +22,8 @@ from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.diagnose.unmodelled import LeftOver
 from truearm.engine.fit.fit import identify
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.frames import initial_frames
-from truearm.engine.fit.held import NOTHING_HELD, Held
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import Model
 from truearm.engine.fit.problem import Problem
@@ -95,13 +95,13 @@ def checked_parts(data: Dataset, training: IntArray, labels: Sequence[str]) -> N
     part = parts_of(data, labels)
     seen = np.unique(data.configuration[data.has_position])
     for number in range(int(part.max()) + 1):
-        mine = np.intersect1d(training[part[training] == number], seen)
-        if len(mine) < _LEAST_CONFIGURATIONS:
+        configurations = np.intersect1d(training[part[training] == number], seen)
+        if len(configurations) < _LEAST_CONFIGURATIONS:
             raise InputError(
                 "a part between two changes of the base has too few training configurations",
                 parameter="base_changes",
                 where=data.source,
-                came=f"{counted(len(mine), 'configuration')} in part {number + 1}",
+                came=f"{counted(len(configurations), 'configuration')} in part {number + 1}",
                 allowed=f"{_LEAST_CONFIGURATIONS} or more",
                 cure="Raise `train`, measure more, or leave the part out.",
             )
@@ -115,7 +115,7 @@ def with_one_base(
     labels: Sequence[str],
     model: Model,
     loss: Loss = "linear",
-    held: Held = NOTHING_HELD,
+    fixed: FixedPlaces = NOTHING_FIXED,
 ) -> tuple[Dataset, list[Notice]]:
     """Return the data with all readings in the frame of the first part, and how far each part was moved.
 
@@ -124,13 +124,13 @@ def with_one_base(
         training: Configurations from which the motions are found.
         labels: See :func:`parts_of`.
         model: What is identified along with the motions.
-        held: Places that are known; the base is that of the first part, and found here all the same.
+        fixed: Places that are known; the base is that of the first part, and found here all the same.
 
     Raises:
         InputError: As :func:`parts_of`, and for a part with fewer than five training configurations.
     """
     part = checked_parts(data, training, labels)
-    moved, tools = data, Held(targets=held.targets)
+    moved, tools = data, FixedPlaces(targets=fixed.targets)
     bases = [
         initial_frames(robot, data.of_configurations(training[part[training] == number]), tools).base
         for number in range(int(part.max()) + 1)
@@ -141,27 +141,29 @@ def with_one_base(
         moved = _moved(moved, part, motions)
         if max(max(float(np.abs(p).max()), float(np.abs(rotation_vector(R)).max())) for R, p in motions) < _LAST_STEP:
             break
-    return moved, [_told(data, moved, part)]
+    return moved, [_notice(data, moved, part)]
 
 
-def _steps(robot: Robot, data: Dataset, part: NDArray[np.intp], model: Model, loss: Loss, held: Held) -> list[Motion]:
+def _steps(
+    robot: Robot, data: Dataset, part: NDArray[np.intp], model: Model, loss: Loss, fixed: FixedPlaces
+) -> list[Motion]:
     """Return the motion that takes each part's readings nearer to the frame of the first, one step of Gauss-Newton."""
-    start = start_from_readings(model.prepared(robot), data, held)
+    start = start_from_readings(model.prepared(robot), data, fixed)
     problem = Problem(start, data, model.free(start), {observation.name: 1.0 for observation in OBSERVATIONS})
     refuse_beyond("derivatives", problem.rows * len(problem.free.names), where=data.source)  # all are needed at once
-    fit = identify(robot, data, model, loss=loss, held=held)
+    fit = identify(robot, data, model, loss=loss, fixed=fixed)
     left = LeftOver.of(fit, data)
     base = [i for i, p in enumerate(fit.free.parameters) if p.group == "base"]
     parts = int(part.max())
     of_row = part[left.configuration]
     H = np.concatenate([left.jacobian[:, base] * (of_row == number + 1)[:, None] for number in range(parts)], axis=1)
-    found = np.linalg.lstsq(left.without_parameters(H), -left.without_parameters(left.residual), rcond=1e-10)[0]
+    solution = np.linalg.lstsq(left.without_parameters(H), -left.without_parameters(left.residual), rcond=1e-10)[0]
     names = [fit.free.names[i] for i in base]
     motions: list[Motion] = [(np.eye(3), np.zeros(3))]
-    here = _flange(fit.robot, data)
-    for step in found.reshape(parts, len(base)):
+    flange = _flange(fit.robot, data)
+    for step in solution.reshape(parts, len(base)):
         values = {name: fit.robot.values[name] + float(d) for name, d in zip(names, step, strict=True)}
-        motions.append(_motion(here, _flange(fit.robot.with_values(values), data)))
+        motions.append(_motion(flange, _flange(fit.robot.with_values(values), data)))
     return motions
 
 
@@ -182,10 +184,10 @@ def _moved(data: Dataset, part: NDArray[np.intp], motions: Sequence[Motion]) -> 
     quaternion = None if data.quaternion is None else data.quaternion.copy()
     of_reading = part[data.configuration]
     for number, (R, shift) in enumerate(motions):
-        mine = of_reading == number
-        position[mine] = position[mine] @ R.T + shift
+        of_part = of_reading == number
+        position[of_part] = position[of_part] @ R.T + shift
         if quaternion is not None:
-            turned = mine & data.has_orientation
+            turned = of_part & data.has_orientation
             quaternion[turned] = quaternion_from_rotation(R @ rotation_from_quaternion(quaternion[turned]))
     return replace(data, position=position, quaternion=quaternion)
 
@@ -195,15 +197,15 @@ BASE_CHANGED: Final = Rule(
 )
 
 
-def _told(before: Dataset, after: Dataset, part: NDArray[np.intp]) -> Notice:
+def _notice(before: Dataset, after: Dataset, part: NDArray[np.intp]) -> Notice:
     """Say how far the readings of each part were moved."""
     gaps = np.linalg.norm(after.position - before.position, axis=1)
     words = []
     for number in range(1, int(part.max()) + 1):
-        mine = (part[before.configuration] == number) & np.isfinite(gaps)
+        of_part = (part[before.configuration] == number) & np.isfinite(gaps)
         number_of = np.where(part == number, np.asarray(before.number), np.inf)
         label = before.labels[int(np.argmin(number_of))]
-        words.append(f"from {label} on by {float(np.sqrt(np.mean(gaps[mine] ** 2))) * 1e3:.3g} mm")
+        words.append(f"from {label} on by {float(np.sqrt(np.mean(gaps[of_part] ** 2))) * 1e3:.3g} mm")
     return BASE_CHANGED(
         f"Readings were moved into the frame of the first base: {', '.join(words)} (root mean square). The motion was "
         "found along with the model from the training configurations and counts as known: no deviation contains what "

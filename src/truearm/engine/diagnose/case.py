@@ -91,12 +91,12 @@ class Case:
     @cached_property
     def of_robot(self) -> list[Notice]:
         """Whether it can be this robot at all, and whether its lengths are this one's."""
-        told = [notice for notice in self.noticed if notice.code == WRONG_ROBOT.code]
-        other = check_robot(self.fit, self.training) if judges_lengths(self.fit) and not self.biased else told
+        noticed = [notice for notice in self.noticed if notice.code == WRONG_ROBOT.code]
+        other = check_robot(self.fit, self.training) if judges_lengths(self.fit) and not self.biased else noticed
         if has_error([*self.of_data, *self.changes]):  # what is wrong with the data bends the robot too
             other = []
-        unlike = check_plausible(self.fit, self.training, (*self.of_data, *other, *told))
-        return [*unlike, *(other or told)] if unlike else other
+        unlike = check_plausible(self.fit, self.training, (*self.of_data, *other, *noticed))
+        return [*unlike, *(other or noticed)] if unlike else other
 
     @property
     def implausible(self) -> bool:
@@ -128,9 +128,9 @@ class Case:
             return too_large, []
         return too_large, check_sigma_beside_joints(self.left)
 
-    def unsilenced(self, told: Sequence[Notice]) -> list[Notice]:
+    def unsilenced(self, notices: Sequence[Notice]) -> list[Notice]:
         """Return the notices but those that say nothing beside the others, by what their rules say."""
-        silencing = {notice.code for notice in told}
+        silencing = {notice.code for notice in notices}
         silencing |= {WRONG_DATA} if has_error([*self.of_data, *self.of_robot]) else set()
         silencing |= {PULLED_AWAY} if self.biased else set()
-        return [notice for notice in told if notice.rule is None or notice.rule.unless.isdisjoint(silencing)]
+        return [notice for notice in notices if notice.rule is None or notice.rule.unless.isdisjoint(silencing)]

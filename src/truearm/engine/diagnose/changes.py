@@ -52,7 +52,7 @@ class Change:
     """What happened during a campaign."""
 
     kind: Kind  #: Code of the notice.
-    what: str  #: Name of the target or number of the joint; empty for the others.
+    subject: str  #: Name of the target or number of the joint; empty for the others.
     #: Index of the first configuration, in the dataset, at which it had happened; of the first measured for a drift.
     first: int
     share: float  #: Of the squared residuals that it explains.
@@ -99,15 +99,15 @@ def find_change(left: LeftOver) -> Change | None:
     at = place[left.configuration][rows]
     every = np.arange(LEAST_VISITS, n - LEAST_VISITS + 1)
     used = sorted({column for _, _, columns in hypotheses for column in columns})
-    where = {column: i for i, column in enumerate(used)}
+    places = {column: i for i, column in enumerate(used)}
     C, r, Q = left.jacobian[rows][:, used], residual[rows], left.basis[rows]
     tests = len(every) * len(hypotheses)
 
     coarse = every if len(every) <= _COARSE else every[np.linspace(0, len(every) - 1, _COARSE).astype(np.intp)]
     sums = _sums(C, r, Q, at, coarse)
-    found: list[tuple[float, Change]] = []
-    for kind, what, columns in hypotheses:
-        chosen = [where[column] for column in columns]
+    judged: list[tuple[float, Change]] = []
+    for kind, subject, columns in hypotheses:
+        chosen = [places[column] for column in columns]
         explained, values = _explained(sums, chosen)
         best = int(np.argmax(explained))
         low, high = coarse[max(best - 1, 0)], coarse[min(best + 1, len(coarse) - 1)]
@@ -117,15 +117,15 @@ def find_change(left: LeftOver) -> Change | None:
             explained, values = _explained(_sums(C[:, chosen], r, Q, at, fine), list(range(len(chosen))))
             best = int(np.argmax(explained))
             k, gain, value = int(fine[best]), float(explained[best]), values[best]
-        found.append(_judged(kind, what, int(order[k]), gain / total, value, effective, tests))
+        judged.append(_judged(kind, subject, int(order[k]), gain / total, value, effective, tests))
     base = next((columns for kind, _, columns in hypotheses if kind == "instrument-moved"), ())
     if base:
-        grown = C[:, [where[column] for column in base]] * (at / (n - 1.0) - 0.5)[:, None]
+        grown = C[:, [places[column] for column in base]] * (at / (n - 1.0) - 0.5)[:, None]
         grown -= Q @ (Q.T @ grown)
         value = np.asarray(np.linalg.lstsq(grown, r, rcond=1e-10)[0], dtype=np.float64)
         gain = float(r @ grown @ value)
-        found.append(_judged("drift", "", int(order[0]), gain / total, value, effective, tests))
-    _, change = min(found, key=lambda entry: entry[0])
+        judged.append(_judged("drift", "", int(order[0]), gain / total, value, effective, tests))
+    _, change = min(judged, key=lambda entry: entry[0])
     if change.chance >= _LARGEST_CHANCE or change.share <= _LEAST_SHARE:
         return None
     return replace(change, by_file=data.number is None, follows=follows)
@@ -191,8 +191,8 @@ def _explained(sums: _Sums, columns: list[int]) -> tuple[Array, Array]:
     values, turns = np.linalg.eigh(scaled)
     along = np.einsum("kji,kj->ki", turns, g / size)
     inverse = np.where(values > _LEAST_SEEN, 1.0 / np.maximum(values, _LEAST_SEEN), 0.0)
-    found = np.einsum("kij,kj->ki", turns, inverse * along) / size
-    return np.sum(inverse * along**2, axis=1), found
+    shifts = np.einsum("kij,kj->ki", turns, inverse * along) / size
+    return np.sum(inverse * along**2, axis=1), shifts
 
 
 #: Share of a change that the free parameters may not take, or else it is not looked for.
@@ -200,7 +200,7 @@ _LEAST_SEEN: Final = 1e-4
 
 
 def _judged(
-    kind: Kind, what: str, first: int, share: float, values: Array, effective: int, tests: int
+    kind: Kind, subject: str, first: int, share: float, values: Array, effective: int, tests: int
 ) -> tuple[float, Change]:
     """Return the Bayesian information criterion of a change, and the change."""
     share = min(max(share, 0.0), 1.0 - 1e-12)
@@ -208,13 +208,7 @@ def _judged(
     criterion = effective * math.log(1.0 - share) + (len(values) + points) * math.log(effective)
     chance = min(1.0, tests * chi_squared_tail(effective * share, len(values)))
     # Residuals of a moved fit are prediction minus reading: the columns, times minus these values, lead back.
-    return criterion, Change(kind, what, first, share, tuple((-values).tolist()), chance)
-
-
-def check_changes(left: LeftOver) -> list[Notice]:
-    """Return a notice if something moved during the campaign."""
-    change = find_change(left)
-    return [] if change is None else notices_of_change(left, change)
+    return criterion, Change(kind, subject, first, share, tuple((-values).tolist()), chance)
 
 
 def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
@@ -222,9 +216,9 @@ def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
 
     A single configuration that is far off looks like something that moved. Nothing is returned where nothing moved.
     """
-    rest = left.without(() if is_a_part(off) else off.indices)
-    change = find_change(rest)
-    return None if change is None else (rest, change)
+    remaining = left.without(() if is_a_part(off) else off.indices)
+    change = find_change(remaining)
+    return None if change is None else (remaining, change)
 
 
 def is_a_part(off: Off) -> bool:
@@ -273,11 +267,11 @@ def notices_of_change(left: LeftOver, change: Change) -> list[Notice]:
         "instrument-moved": f"From configuration {label} on, all readings stand {size}: the instrument or "
         f"the robot's base moved. {explains} Measure again from there, calibrate the parts apart, or name {label} in "
         "`base_changes`.",
-        "target-moved": f"From configuration {label} on, target {change.what} stands {size} on the flange: it was "
+        "target-moved": f"From configuration {label} on, target {change.subject} stands {size} on the flange: it was "
         f"touched or seated anew. {explains} Give it another name from there on.",
-        "joint-zero-jumped": f"From configuration {label} on, joint {change.what} stands {size}: its zero jumped, as "
-        f"after a collision, a slipped belt or a new mastering. {explains} Measure again from there, or calibrate the "
-        "parts apart.",
+        "joint-zero-jumped": f"From configuration {label} on, joint {change.subject} stands {size}: its zero jumped, "
+        f"as after a collision, a slipped belt or a new mastering. {explains} Measure again from there, or calibrate "
+        "the parts apart.",
         "drift": f"All readings moved evenly during the campaign, by {size} in all: the instrument, the robot's base "
         f"or its temperature drifted. {explains} Measure reference points beside the robot along with the targets, or "
         "let the arm warm up first.",
@@ -299,7 +293,7 @@ def notices_of_change(left: LeftOver, change: Change) -> list[Notice]:
 def _size(left: LeftOver, change: Change) -> str:
     """Return in words how far things moved."""
     if change.kind == "joint-zero-jumped":
-        joint = left.fit.robot.joints[int(change.what) - 1]
+        joint = left.fit.robot.joints[int(change.subject) - 1]
         value = abs(change.values[0])
         return f"{math.degrees(value):.3g} deg off" if joint.kind == "revolute" else f"{value * 1e3:.3g} mm off"
     if change.kind == "target-moved":

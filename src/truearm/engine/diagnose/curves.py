@@ -100,7 +100,7 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
             (little if high - low < _LITTLE else none).append(f"{name} ({np.rad2deg(high - low):.0f} deg)")
         elif high - low < 2.0 * math.pi - _GAP:
             partly.append(f"{name} from {np.rad2deg(low):.0f} to {np.rad2deg(high):.0f} deg")
-    found = []
+    notices = []
     if little or none:
         words = []
         if none:
@@ -108,28 +108,28 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
         if little:
             words.append(f"{', '.join(little)} turned too little to tell such an error from geometry")
         sentence = "; ".join(words)
-        found.append(
+        notices.append(
             CURVE_LEFT_OUT(
                 f"Joints without a curve (in brackets how far each turned): {sentence}. More configurations, through "
                 "more of the turn, may show one."
             )
         )
     if Fourier.name in fit.model.effects:
-        found.append(
+        notices.append(
             CURVES_AND_FOURIER(
                 "The model has curves of the joints and the effect fourier, whose one and two periods a turn curves "
                 "contain. The readings do not tell the two apart: leave fourier out."
             )
         )
     if partly:
-        found.append(
+        notices.append(
             CURVE_RANGE(
                 f"Curves of joints are known where these were measured: {'; '.join(partly)}. Outside they are what "
                 "was found there, continued. The expected error over the workspace contains what that may be off by, "
                 "as far as other joints and ordinary encoders tell."
             )
         )
-    return found
+    return notices
 
 
 # Whether curves of joints stand in for joints that give way.
@@ -183,18 +183,18 @@ def share_of_loads(left: LeftOver) -> float:
     robot = fit.robot.with_effects([Compliance.name])
     springs = FreeParameters(tuple(p for p in robot.parameters.values() if p.group == Compliance.name))
     columns = replace(left.problem, robot=robot, free=springs).at(springs.start).jacobian * springs.prior
-    done = left.jacobian[:, curved] @ values[curved]
-    columns, done = columns - Q @ (Q.T @ columns), done - Q @ (Q.T @ done)
-    total = float(done @ done)
-    if total <= float(len(done)) * 1e-6:
+    deflection = left.jacobian[:, curved] @ values[curved]
+    columns, deflection = columns - Q @ (Q.T @ columns), deflection - Q @ (Q.T @ deflection)
+    total = float(deflection @ deflection)
+    if total <= float(len(deflection)) * 1e-6:
         return 0.0
-    amounts = np.linalg.solve(columns.T @ columns + np.eye(columns.shape[1]), columns.T @ done)
-    rest = done - columns @ amounts
-    return max(1.0 - float(rest @ rest) / total, 0.0)
+    amounts = np.linalg.solve(columns.T @ columns + np.eye(columns.shape[1]), columns.T @ deflection)
+    residual = deflection - columns @ amounts
+    return max(1.0 - float(residual @ residual) / total, 0.0)
 
 
 #: Weight below which a reading counts as held back.
-_HELD_BACK: Final = 0.5
+_OUTLYING: Final = 0.5
 #: Configurations with such readings, at least.
 _LEAST: Final = 8
 #: Chi squared of three degrees of freedom that chance exceeds in 1 of 10 000 cases.
@@ -221,12 +221,12 @@ def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
     Args:
         data: What the fit was made from.
     """
-    held = (np.nan_to_num(fit.weight, nan=1.0) < _HELD_BACK) & data.has_position
-    if not held.any():
+    outlying = (np.nan_to_num(fit.weight, nan=1.0) < _OUTLYING) & data.has_position
+    if not outlying.any():
         return []
-    off = -errors_of(fit.robot, data).position_errors[held]
+    off = -errors_of(fit.robot, data).position_errors[outlying]
     towards = off / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-300)
-    visits = np.unique(data.configuration[held], return_inverse=True)[1].reshape(-1)
+    visits = np.unique(data.configuration[outlying], return_inverse=True)[1].reshape(-1)
     count = np.bincount(visits)
     if len(count) < _LEAST:
         return []
@@ -237,15 +237,15 @@ def check_one_sided(fit: Fit, data: Dataset) -> list[Notice]:
     shift = ", ".join(f"{v * 1e3:+.2g}" for v in np.median(off, axis=0).tolist())
     return [
         OUTLIERS_ONE_SIDED(
-            f"{int(held.sum())} readings at {len(count)} configurations are held back as outliers, and they lie to one "
-            f"side: by ({shift}) mm in the instrument's axes, in the median. Outliers to one side pull the fit along, "
-            "and the deviations of the parameters do not contain that bias."
+            f"{int(outlying.sum())} readings at {len(count)} configurations are held back as outliers, and they lie to "
+            f"one side: by ({shift}) mm in the instrument's axes, in the median. Outliers to one side pull the fit "
+            "along, and the deviations of the parameters do not contain that bias."
         )
     ]
 
 
 #: Angles without a training configuration that are wider than this are outside the measured range [rad].
-_GAP_FOUND_CURVES: Final = math.radians(20.0)
+_LARGEST_GAP: Final = math.radians(20.0)
 #: Steps of a grid on which a curve is looked at [rad]: a twelfth of the shortest period.
 _STEP: Final = math.radians(0.5)
 #: A neighbour belongs to a group of periods if its square is at least this share of the group's largest.
@@ -271,7 +271,7 @@ class Periods:
 
 
 @dataclass(frozen=True, eq=False)
-class FoundCurve:
+class FittedCurve:
     """The curve of one joint, as a fit found it."""
 
     number: int  #: Of the joint, from 1.
@@ -304,11 +304,11 @@ class FoundCurve:
         """The ranges in which there are training configurations [rad], in order; gaps of 20 deg part them."""
         if not len(self.places):
             return ()
-        ends = np.flatnonzero(np.diff(self.places) > _GAP_FOUND_CURVES)
+        ends = np.flatnonzero(np.diff(self.places) > _LARGEST_GAP)
         first, last = self.places[[0, *(ends + 1)]], self.places[[*ends, -1]]
         low, high = self.shown
         if (
-            self.whole_turn and self.places[0] + high - low - self.places[-1] <= _GAP_FOUND_CURVES
+            self.whole_turn and self.places[0] + high - low - self.places[-1] <= _LARGEST_GAP
         ):  # across the end of the turn
             first, last = np.r_[low, first[1:]], np.r_[last[:-1], high]
         return tuple(zip(first.tolist(), last.tolist(), strict=True))
@@ -350,7 +350,7 @@ class FoundCurve:
         return tuple(groups)
 
 
-def found_curves(fit: Fit, training: Dataset) -> tuple[FoundCurve, ...]:
+def fitted_curves(fit: Fit, training: Dataset) -> tuple[FittedCurve, ...]:
     """Return the curves that a fit found, joint by joint; none of joints whose curve is zero.
 
     Args:
@@ -359,7 +359,7 @@ def found_curves(fit: Fit, training: Dataset) -> tuple[FoundCurve, ...]:
     return tuple(_curves(fit, training))
 
 
-def _curves(fit: Fit, training: Dataset) -> Iterator[FoundCurve]:
+def _curves(fit: Fit, training: Dataset) -> Iterator[FittedCurve]:
     place = {name: i for i, name in enumerate((*fit.free.names, *fit.unfitted))}
     uncertain = fit.covariance_with_unfitted
     for number, joint in enumerate(fit.robot.joints, 1):
@@ -380,4 +380,4 @@ def _curves(fit: Fit, training: Dataset) -> Iterator[FoundCurve]:
             places = (places + math.pi) % turn - math.pi
         else:
             shown = (min(shown[0], float(places.min())), max(shown[1], float(places.max())))
-        yield FoundCurve(number, joint.name, amounts, covariance, shown, np.sort(places))
+        yield FittedCurve(number, joint.name, amounts, covariance, shown, np.sort(places))

@@ -10,7 +10,7 @@ from truearm.engine.base.limits import limit
 from truearm.engine.data.checks import check_data, check_range
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import without_table_motion
-from truearm.engine.data.thinning import thinned
+from truearm.engine.data.thinning import JUDGED_IN_PART, thinned
 from truearm.engine.diagnose.plausibility import check_against
 from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.robot import Robot
@@ -76,13 +76,8 @@ def _too_seldom(data: Dataset) -> Notice:
     )
 
 
-COMPARED_IN_PART: Final = Rule(
-    "compared-in-part", "note", "the data are large, and a part of them was compared with the robot"
-)
-
-
 def _in_part(part: Dataset, data: Dataset) -> Notice:
-    return COMPARED_IN_PART(
+    return JUDGED_IN_PART(
         f"The data are large: {part.configurations} of {counted(data.configurations, 'configuration')} and "
         f"{len(part.targets)} of {counted(len(data.targets), 'target')} were compared with the robot, evenly spaced "
         "and read most often. What is far off elsewhere was not looked for."

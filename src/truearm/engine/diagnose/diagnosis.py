@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.engine.base.errors import Notice, Rule, counted, worst_first
+from truearm.engine.data.thinning import JUDGED_IN_PART
 from truearm.engine.diagnose.advice import check_far_from_nominal, check_fit
 from truearm.engine.diagnose.case import Case
 from truearm.engine.diagnose.changes import OF_CHANGES
@@ -125,22 +126,14 @@ def diagnose(case: Case) -> Diagnosis:
     return Diagnosis(case.expected, warnings, steps_after_fit(case, warnings))
 
 
-JUDGED_IN_PART: Final = Rule(
-    "judged-in-part",
-    "note",
-    "the data are large: what the fit leaves was looked at in a part of the configurations, as many as the "
-    "[limit](data.md#limits) of derivatives has room for",
-)
-
-
 def _in_part(left: LeftOver) -> list[Notice]:
     """Say if what the fit leaves was looked at in part of the configurations alone."""
-    if len(left.chosen) == left.given.configurations:
+    if len(left.chosen) == left.asked.configurations:
         return []
     return [
         JUDGED_IN_PART(
             f"The data are large for so many parameters: what the fit leaves was looked at in {len(left.chosen)} of "
-            f"{counted(left.given.configurations, 'configuration')}, evenly spaced. What is off or changed at others "
+            f"{counted(left.asked.configurations, 'configuration')}, evenly spaced. What is off or changed at others "
             "alone is not told. Parameters and errors are those of all configurations."
         )
     ]

@@ -86,8 +86,8 @@ def length_entry_errors(data: Dataset) -> Iterator[EntryError]:
     for factor, words in LENGTH_FACTORS:
         if factor > 1.0 and np.nanmax(np.abs(data.position), initial=0.0) * factor > FARTHEST:
             continue
-        what = "positions" if data.fixture is None else "lengths"
-        words = f"The {what} are {words}. Fix the unit in the header"
+        quantity = "positions" if data.fixture is None else "lengths"
+        words = f"The {quantity} are {words}. Fix the unit in the header"
         yield EntryError(UNIT_LENGTH, words, _scaled(data, factor))
 
 
@@ -110,9 +110,9 @@ def scale_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
     """
     p, R = robot.with_frames(Transform(), {}).world_poses(data.postures)
     readings = np.flatnonzero(data.has_position)
-    where, what = data.configuration[readings], data.target[readings]
+    configuration, target = data.configuration[readings], data.target[readings]
     y = data.position[readings] - data.position[readings].mean(axis=0)
-    seen = np.unique(what)
+    seen = np.unique(target)
     unknowns = 9 + 3 * len(seen) + 3
     if 3 * len(readings) < 2 * unknowns:
         return
@@ -120,11 +120,11 @@ def scale_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
     for i in range(3):
         rows[:, i, 3 * i : 3 * i + 3] = y
     for column, t in enumerate(seen.tolist()):
-        mine = what == t
-        rows[mine, :, 9 + 3 * column : 12 + 3 * column] = -R[where[mine]]
+        of_target = target == t
+        rows[of_target, :, 9 + 3 * column : 12 + 3 * column] = -R[configuration[of_target]]
     rows[:, :, -3:] = -np.eye(3)
-    found = np.linalg.lstsq(rows.reshape(-1, unknowns), p[where].reshape(-1), rcond=1e-10)[0]
-    onto = np.asarray(found[:9].reshape(3, 3), dtype=float)
+    solution = np.linalg.lstsq(rows.reshape(-1, unknowns), p[configuration].reshape(-1), rcond=1e-10)[0]
+    onto = np.asarray(solution[:9].reshape(3, 3), dtype=float)
     stretch = np.linalg.svd(onto, compute_uv=False)
     if stretch[2] <= 0.0:
         return
@@ -177,8 +177,8 @@ def angle_entry_errors(data: Dataset) -> Iterator[EntryError]:
                 continue
             joints = data.joints.copy()
             joints[:, group] *= factor
-            which = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
-            words_of = f"{which}: {words}. Fix the unit in the header"
+            subject = "The joints" if len(group) > 1 else f"Joint {group[0] + 1}"
+            words_of = f"{subject}: {words}. Fix the unit in the header"
             yield EntryError(UNIT_ANGLE, words_of, replace(data, joints=joints))
 
 
@@ -196,13 +196,13 @@ def mixed_angle_entry_errors(data: Dataset) -> Iterator[EntryError]:
         (largest > most, math.pi / 180, "degrees are called rad"),
         (largest <= most * (math.pi / 180), 180 / math.pi, "radians are called deg"),
     ):
-        which = np.flatnonzero(mask)
-        if not 0 < len(which) < data.configurations:
+        configurations = np.flatnonzero(mask)
+        if not 0 < len(configurations) < data.configurations:
             continue
         joints = data.joints.copy()
-        joints[np.ix_(which, np.array(turning))] *= factor
-        first = ", ".join(data.labels[c] for c in which[:_MOST_NAMED].tolist())
-        some = f"{first} and others" if len(which) > _MOST_NAMED else first
+        joints[np.ix_(configurations, np.array(turning))] *= factor
+        first = ", ".join(data.labels[c] for c in configurations[:_MOST_NAMED].tolist())
+        some = f"{first} and others" if len(configurations) > _MOST_NAMED else first
         words_of = f"The joints: {words}, at some configurations alone ({some}). Fix the numbers of these rows"
         yield EntryError(UNIT_ANGLE, words_of, replace(data, joints=joints))
 
@@ -240,8 +240,8 @@ def sign_entry_errors(data: Dataset, size: int = 1) -> Iterator[EntryError]:
     for group in map(list, combinations(range(data.joints.shape[1]), size)):
         joints = data.joints.copy()
         joints[:, group] *= -1
-        which = " and ".join(str(i + 1) for i in group)
-        words = f"The sign of joint {which} is opposite to the robot's: the data fit with it changed. "
+        numbers = " and ".join(str(i + 1) for i in group)
+        words = f"The sign of joint {numbers} is opposite to the robot's: the data fit with it changed. "
         yield EntryError(
             JOINT_SIGN, words + "Change it in the data, or correct the robot file", replace(data, joints=joints)
         )
@@ -260,8 +260,8 @@ def shifted(data: Dataset) -> Iterator[EntryError]:
     """Try the joint positions of the row before, and of the row after."""
     for by, words in ((1, "before"), (-1, "after")):
         joints = np.roll(data.joints, by, axis=0)
-        said = f"The readings of each configuration fit the joint positions of the one {words} it: the columns are "
-        yield EntryError(ROWS_SHIFTED, said + "shifted by one row. Shift them back", replace(data, joints=joints))
+        message = f"The readings of each configuration fit the joint positions of the one {words} it: the columns are "
+        yield EntryError(ROWS_SHIFTED, message + "shifted by one row. Shift them back", replace(data, joints=joints))
 
 
 # Data-entry errors with orientations: quaternions in another order, turns the other way round, angles of another
@@ -273,20 +273,15 @@ def shifted(data: Dataset) -> Iterator[EntryError]:
 # fixed axes (Craig, Introduction to Robotics, appendix B), and rotation vectors; in radians, and in radians that were
 # called degrees.
 
-QUATERNION_ORDER: Final = Rule(
-    "quaternion-order",
-    "error",
-    "quaternions, all or some, that do not turn as the robot does: another order, or the inverse, as of transposed "
-    "matrices",
-)
 ORIENTATION_ORDER: Final = Rule(
     "orientation-order",
     "error",
-    "orientations, all or some, that would turn as the robot does [if their angles were read "
-    "otherwise](check.md#orientations-read-by-another-convention)",
+    "orientations, all or some, that would turn as the robot does if their numbers were read otherwise: [angles by "
+    "another convention](check.md#orientations-read-by-another-convention), quaternions in another order, or their "
+    "inverse, as of transposed matrices",
     cure="Fix the mapping, or whatever made quaternions of them.",
+    formerly="quaternion-order",
 )
-ORIENTATION_ENTRY_ERRORS: Final = frozenset({QUATERNION_ORDER, ORIENTATION_ORDER})
 #: Orientations of a nominal robot agree better than this [rad]; a wrong order of a quaternion leaves 1 rad and more.
 _TURNED_WITHIN: Final = 0.1
 #: A data-entry error explains orientations that it leaves so near to the robot's [rad], and so many times nearer than
@@ -296,7 +291,7 @@ _LEAST_IMPROVEMENT: Final = 4.0
 #: Data-entry errors that leave so little more than the best one are as good.
 _AS_GOOD: Final = 1.5
 #: So many ways that are as good are told one by one.
-_MOST_TOLD: Final = 3
+_MOST_LISTED: Final = 3
 #: Fewer orientations agree with one of so many ways by chance.
 _FEWEST: Final = 6
 #: Of single rows, where it is known how they should turn, so few.
@@ -327,17 +322,17 @@ def orientation_entry_errors(robot: Robot, data: Dataset) -> list[Notice]:
     if not readings.rows:
         return []
     read = data.quaternion[readings.taken]
-    given = readings.left(rotation_from_quaternion(read))
-    if given <= _TURNED_WITHIN:
+    as_given = readings.left(rotation_from_quaternion(read))
+    if as_given <= _TURNED_WITHIN:
         return []
     left, words = min(
         (readings.left(rotation_from_quaternion(corrected)), words) for words, corrected in _of_numbers(read)
     )
-    if left * _LEAST_IMPROVEMENT <= given:
-        return [QUATERNION_ORDER(f"The quaternions do not turn as the robot does: {words}.")]
+    if left * _LEAST_IMPROVEMENT <= as_given:
+        return [ORIENTATION_ORDER(f"The quaternions do not turn as the robot does: {words}.")]
     if readings.rows < _FEWEST:
         return []
-    return _of_angles(readings, rotation_from_quaternion(read), given)
+    return _of_angles(readings, rotation_from_quaternion(read), as_given)
 
 
 def _of_numbers(read: Array) -> Iterator[tuple[str, Array]]:
@@ -360,10 +355,10 @@ class _Readings:
     def of(cls, placed: Robot, data: Dataset) -> _Readings:
         """Return those of some data."""
         groups = [np.flatnonzero(data.has_orientation & (data.target == t)) for t in range(len(data.targets))]
-        groups = [mine for mine in groups if len(mine) > 1]
+        groups = [group for group in groups if len(group) > 1]
         taken = np.concatenate([*groups, np.zeros(0, dtype=np.intp)]).astype(np.intp)
         _, R = placed.world_poses(data.postures)
-        ends = tuple(np.cumsum([len(mine) for mine in groups]).tolist())
+        ends = tuple(np.cumsum([len(group) for group in groups]).tolist())
         return cls(np.swapaxes(R[data.configuration[taken]], 1, 2), taken, ends)
 
     @property
@@ -380,9 +375,9 @@ class _Readings:
         squares, start = 0.0, 0
         on_flange = [self.flange @ turned for turned in ways]
         for end in self.ends:
-            mine = [turned[start:end] for turned in on_flange]
+            groups = [turned[start:end] for turned in on_flange]
             start = end
-            squares += min(_squares_off(_nearest(mine, first[0])) for first in mine)
+            squares += min(_squares_off(_nearest(groups, first[0])) for first in groups)
         return float(np.sqrt(squares / self.rows))
 
 
@@ -404,27 +399,27 @@ def _squares_off(R: Array) -> float:
 # -- angles ------------------------------------------------------------------------------------------------
 
 
-def _of_angles(readings: _Readings, turned: Array, given: float) -> list[Notice]:
+def _of_angles(readings: _Readings, turned: Array, as_given: float) -> list[Notice]:
     """Say as what the numbers of the orientations agree with the robot's, if they do as another convention's."""
     tried = []
     for rare, words, ways in _other_conventions(turned):
         left = readings.left(*ways)
-        if left <= _EXPLAINED_WITHIN and left * _LEAST_IMPROVEMENT <= given:
+        if left <= _EXPLAINED_WITHIN and left * _LEAST_IMPROVEMENT <= as_given:
             tried.append((rare, left, words))
     least = min((left for _, left, _ in tried), default=0.0)
-    told = [words for _, left, words in sorted(tried) if left <= _AS_GOOD * least]
-    if not told:
+    alternatives = [words for _, left, words in sorted(tried) if left <= _AS_GOOD * least]
+    if not alternatives:
         return []
     return [
         ORIENTATION_ORDER(
             "The orientations do not turn as the robot does, and would if their three numbers were read otherwise: "
-            f"{_first_of(told)}."
+            f"{_first_of(alternatives)}."
         )
     ]
 
 
-def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], Rule, str]:
-    """Return which single orientations turn as they should when they are read otherwise, the rule, and how in words.
+def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool_], str]:
+    """Return which single orientations turn as they should when they are read otherwise, and how in words.
 
     Of all ways the one is taken that explains most of them: it must explain two, or one by the order of a quaternion.
 
@@ -435,10 +430,7 @@ def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool
     turned = rotation_from_quaternion(read)
     allowed = np.minimum(_EXPLAINED_WITHIN, _angles_between([turned], predicted) / _IMPROVEMENT_OF_ROWS)
     of_numbers = [(0, words, [rotation_from_quaternion(corrected)]) for words, corrected in _of_numbers(read)]
-    for rule, fewest, ways in (
-        (QUATERNION_ORDER, 1, of_numbers),
-        (ORIENTATION_ORDER, _FEWEST_ROWS, _other_conventions(turned)),
-    ):
+    for fewest, ways in ((1, of_numbers), (_FEWEST_ROWS, _other_conventions(turned))):
         tried = []
         for rare, words, turns in ways:
             off = _angles_between(turns, predicted)
@@ -447,12 +439,12 @@ def entry_errors_in_rows(read: Array, predicted: Array) -> tuple[NDArray[np.bool
                 left = float(np.sqrt(np.mean(off[explained] ** 2)))
                 tried.append((-int(explained.sum()), rare, left, words, explained))
         if tried:
-            most = [one for one in tried if one[0] == min(count for count, *_ in tried)]
+            most = [trial for trial in tried if trial[0] == min(count for count, *_ in tried)]
             least = min(left for _, _, left, _, _ in most)
-            told = sorted((rare, left, words) for _, rare, left, words, _ in most if left <= _AS_GOOD * least)
-            which = next(explained for *_, words, explained in most if words == told[0][2])
-            return which, rule, _first_of([words for *_, words in told])
-    return np.zeros(len(read), dtype=bool), QUATERNION_ORDER, ""
+            likely = sorted((rare, left, words) for _, rare, left, words, _ in most if left <= _AS_GOOD * least)
+            rows = next(explained for *_, words, explained in most if words == likely[0][2])
+            return rows, _first_of([words for *_, words in likely])
+    return np.zeros(len(read), dtype=bool), ""
 
 
 def _other_conventions(turned: Array) -> Iterator[tuple[int, str, list[Array]]]:
@@ -476,11 +468,11 @@ def _other_conventions(turned: Array) -> Iterator[tuple[int, str, list[Array]]]:
                     yield sum(rare), _in_words(read, meant, factor != 1.0), [_rotations(n, meant) for n in numbers]
 
 
-def _first_of(told: list[str]) -> str:
+def _first_of(alternatives: list[str]) -> str:
     """Return the first ways in words, and how many more there are."""
-    more = len(told) - _MOST_TOLD
+    more = len(alternatives) - _MOST_LISTED
     beyond = f"; or in {more} other ways, which these configurations do not tell apart" if more > 0 else ""
-    return f"{'; or '.join(told[:_MOST_TOLD])}{beyond}"
+    return f"{'; or '.join(alternatives[:_MOST_LISTED])}{beyond}"
 
 
 def _angles_between(ways: list[Array], predicted: Array) -> Array:

@@ -77,9 +77,9 @@ def mixed_length_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryErro
     predicted = _predicted(placed, data)
     factor = factors_of(data.position, predicted, _allowed(data, predicted))
     for t in range(len(data.targets)):
-        mine = (data.target == t) & data.has_position
-        if len(np.unique(factor[mine])) == 1:  # the unit of the target, not of rows
-            factor[mine] = 1.0
+        of_target = (data.target == t) & data.has_position
+        if len(np.unique(factor[of_target])) == 1:  # the unit of the target, not of rows
+            factor[of_target] = 1.0
     if (factor == 1.0).all():
         return
     words, at = lengths_noticed(data, factor)
@@ -97,10 +97,10 @@ def _placed(robot: Robot, data: Dataset) -> Robot | None:
     for part in (order[: n // 2], order[n - n // 2 :], order[n // 4 : n - n // 4]):
         if len(part) < _FEWEST_PLACED:
             return None
-        mine = data.of_readings(data.has_position & np.isin(data.configuration, part))
-        farthest = float(np.abs(mine.position).max())
+        readings = data.of_readings(data.has_position & np.isin(data.configuration, part))
+        farthest = float(np.abs(readings.position).max())
         for by in (by for by in _UNITS if by * farthest <= FARTHEST or by <= 1.0):
-            placed = initial_frames(robot, replace(mine, position=by * mine.position))
+            placed = initial_frames(robot, replace(readings, position=by * readings.position))
             predicted = _predicted(placed, data)[read]
             apart = np.nanmedian(np.linalg.norm(predicted - np.nanmedian(predicted, axis=0), axis=1))
             share = float(np.median(_gaps(data.position[read], predicted)) / apart) if apart > 0.0 else np.inf
@@ -121,8 +121,8 @@ def _predicted(placed: Robot, data: Dataset) -> Array:
     """Return where the placed robot has the target of each reading [m], ``(readings, 3)``; NaN if it has none."""
     predicted = np.full(data.position.shape, np.nan)
     for target in placed.targets:
-        mine = data.target == data.targets.index(target.name)
-        predicted[mine] = placed.world_poses(data.postures, target.name)[0][data.configuration[mine]]
+        of_target = data.target == data.targets.index(target.name)
+        predicted[of_target] = placed.world_poses(data.postures, target.name)[0][data.configuration[of_target]]
     return predicted
 
 
@@ -147,7 +147,7 @@ def _allowed(data: Dataset, predicted: Array) -> float:
 _REACH: Final = 0.45
 _STEP: Final = 0.15
 #: Places that are gone on from, and steps.
-_PLACES_KEPT: Final = 12
+_MOST_PLACES: Final = 12
 _STEPS: Final = 40
 #: A weak pull towards the start keeps what nothing determines where it is, beside readings of 1 m.
 _PULL: Final = 1e-6
@@ -168,10 +168,10 @@ def quick_misfit(robot: Robot, data: Dataset) -> float | None:
     p, R = robot.world_poses(data.postures)
     off = []
     for target in np.unique(data.target).tolist():
-        mine = np.flatnonzero(data.target == target)
-        _, of = np.unique(data.against[mine], return_inverse=True)
-        where = data.configuration[mine]
-        off.append(_off_by(p[where], R[where], of, distance[mine]))
+        readings = np.flatnonzero(data.target == target)
+        _, of = np.unique(data.against[readings], return_inverse=True)
+        configuration = data.configuration[readings]
+        off.append(_off_by(p[configuration], R[configuration], of, distance[readings]))
     return float(np.median(np.abs(np.concatenate(off))))
 
 
@@ -197,10 +197,12 @@ def _off_by(p: Array, R: Array, of: NDArray[np.intp], d: Array) -> Array:
     tips = p + np.einsum("nij,gj->gni", R, grid)
     centres, cost = np.empty((len(grid), int(of.max()) + 1, 3)), np.zeros(len(grid))
     for index in range(centres.shape[1]):
-        mine = of == index
-        centres[:, index] = centres_of(tips[:, mine], d[mine])
-        cost += np.sum((np.linalg.norm(tips[:, mine] - centres[:, index, None], axis=2) - d[mine]) ** 2, axis=1)
-    best = np.argsort(cost)[:_PLACES_KEPT]
+        of_fixture = of == index
+        centres[:, index] = centres_of(tips[:, of_fixture], d[of_fixture])
+        cost += np.sum(
+            (np.linalg.norm(tips[:, of_fixture] - centres[:, index, None], axis=2) - d[of_fixture]) ** 2, axis=1
+        )
+    best = np.argsort(cost)[:_MOST_PLACES]
     settled = np.abs(_settled(p, R, of, d, grid[best], centres[best]))
     return np.asarray(settled[np.argmin(np.median(settled, axis=1))])
 
@@ -208,7 +210,7 @@ def _off_by(p: Array, R: Array, of: NDArray[np.intp], d: Array) -> Array:
 def _settled(p: Array, R: Array, of: NDArray[np.intp], d: Array, target: Array, centres: Array) -> Array:
     """Return what is left of the distances ``(starts, n)`` [m] where steps from the starts end."""
     starts, fixtures, _ = centres.shape
-    one = np.eye(fixtures)[of]
+    indicator = np.eye(fixtures)[of]
     damping = np.full(starts, 1e-3)
 
     def seen(target: Array, centres: Array) -> tuple[Array, Array]:
@@ -219,20 +221,20 @@ def _settled(p: Array, R: Array, of: NDArray[np.intp], d: Array, target: Array, 
     off, along = seen(target, centres)
     for _ in range(_STEPS):
         by_target = np.einsum("gni,nij->gnj", along, R)
-        by_centres = -(one[None, :, :, None] * along[:, :, None, :]).reshape(starts, len(d), -1)
+        by_centres = -(indicator[None, :, :, None] * along[:, :, None, :]).reshape(starts, len(d), -1)
         J = np.concatenate([by_target, by_centres], axis=2)
         transposed = J.swapaxes(1, 2)
         normal = transposed @ J
         size = normal.diagonal(axis1=1, axis2=2)
         normal = normal + np.eye(normal.shape[1]) * (damping[:, None] * size + _PULL)[:, None, :]
         step = -np.linalg.solve(normal, transposed @ off[..., None])[..., 0]
-        there, centred = target + step[:, :3], centres + step[:, 3:].reshape(centres.shape)
-        now_off, now_along = seen(there, centred)
+        trial, centred = target + step[:, :3], centres + step[:, 3:].reshape(centres.shape)
+        now_off, now_along = seen(trial, centred)
         better = (now_off**2).sum(axis=1) < (off**2).sum(axis=1)
         damping = np.where(better, np.maximum(damping / 10, 1e-9), np.minimum(damping * 10, 1e6))
         if not better.any() or np.abs(step).max() < 1e-7:
             break
-        target, centres = np.where(better[:, None], there, target), np.where(better[:, None, None], centred, centres)
+        target, centres = np.where(better[:, None], trial, target), np.where(better[:, None, None], centred, centres)
         off = np.where(better[:, None], now_off, off)
         along = np.where(better[:, None, None], now_along, along)
     return off
@@ -276,7 +278,7 @@ def entry_errors_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     """Return which data-entry error explains positions in the instrument's frame; nothing if all or none fit."""
     data, robot = _few_targets(data), robot.with_frames(Transform(), {})  # made once for all that is tried
     turned = orientation_entry_errors(robot, _some(data))
-    some, rest = _some(data), replace(data, quaternion=None, sigma_rot=None)
+    some, positions = _some(data), replace(data, quaternion=None, sigma_rot=None)
     some = replace(some, quaternion=None, sigma_rot=None)
     seen = [t for t in range(len(some.targets)) if (some.has_position & (some.target == t)).any()]
     errors = placed_errors(robot, [_only(some, t) for t in seen])
@@ -288,7 +290,7 @@ def entry_errors_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     rows = _best(
         robot,
         some,
-        (replace(entry, data=_some(entry.data)) for entry in mixed_length_entry_errors(robot, rest)),
+        (replace(entry, data=_some(entry.data)) for entry in mixed_length_entry_errors(robot, positions)),
     )
     if rows is not None:
         return [rows.notice]
@@ -296,22 +298,22 @@ def entry_errors_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
         best = _best(
             robot,
             some,
-            _simple_entry_errors(robot, rest),
+            _simple_entry_errors(robot, positions),
             lambda: [
                 entry for size in (2, 3) for entry in as_noted(robot, some, partial(sign_entry_errors, size=size))
             ],
         )
         if best is not None:
             return [best.notice]
-        return turned or _two_entry_errors(robot, rest) or _beyond_reach(robot, some) or _unrelated(robot, some)
+        return turned or _two_entry_errors(robot, positions) or _beyond_reach(robot, some) or _unrelated(robot, some)
     # The other targets fit with the same joints, so these are right.
-    found = []
+    notices = []
     for t in bad:
         only = _only(some, t)
         best = _best(robot, only, [*length_entry_errors(only), *mirrored(only), *scale_entry_errors(robot, only)])
         if best is not None:
-            found.append(best.rule(f"Target {some.targets[t]}: {best.words}."))
-    return [*turned, *found] or _beyond_reach(robot, some)
+            notices.append(best.rule(f"Target {some.targets[t]}: {best.words}."))
+    return [*turned, *notices] or _beyond_reach(robot, some)
 
 
 def _two_entry_errors(robot: Robot, data: Dataset) -> list[Notice]:
@@ -360,15 +362,15 @@ def _best(
     tried = list(entries)
     if not tried:
         return None
-    given = _misfit(robot, data) / _spread(data)
+    as_given = _misfit(robot, data) / _spread(data)
     shares = _shares(robot, tried)
-    if min(shares) * _PLAIN_IMPROVEMENT > given:
+    if min(shares) * _PLAIN_IMPROVEMENT > as_given:
         more = several()
         tried += more
         shares += _shares(robot, more)
     least = min(shares)
     best = next(entry for entry, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
-    return best if least * _LEAST_IMPROVEMENT < given else None
+    return best if least * _LEAST_IMPROVEMENT < as_given else None
 
 
 def _shares(robot: Robot, entries: Sequence[EntryError]) -> list[float]:
@@ -394,7 +396,7 @@ def entry_errors_in_lengths(robot: Robot, data: Dataset) -> list[Notice]:
         *as_noted(robot, data, sign_entry_errors),
         *as_noted(robot, data, order_entry_errors),
     ):
-        travel, before = (np.ptp(one.joints, axis=0) for one in (entry.data, data))
+        travel, before = (np.ptp(dataset.joints, axis=0) for dataset in (entry.data, data))
         less = travel < 0.5 * before
         if min(travel.max(), travel[less].max(initial=0.0) if less.any() else np.inf) < _LEAST_TRAVEL:
             continue  # an arm that hardly moves fits any fixture, and so does a joint that would hardly move
@@ -424,12 +426,12 @@ def entry_errors_by_fit(robot: Robot, data: Dataset) -> list[Notice]:
     explain.
     """
     some = _some(replace(_few_targets(data), quaternion=None, sigma=None, sigma_rot=None))
-    given = _fitted_misfit(robot, some)
+    as_given = _fitted_misfit(robot, some)
     tries = [*controller_entry_errors(robot, some), *mirrored(some), *as_noted(robot, some, sign_entry_errors)]
     tried = [(_fitted_misfit(robot, entry.data), entry) for entry in tries]
     least = min(left for left, _ in tried)
     entry = next(entry for left, entry in tried if left <= _AS_GOOD * least)
-    return [entry.notice] if least * _LEAST_IMPROVEMENT < given else []
+    return [entry.notice] if least * _LEAST_IMPROVEMENT < as_given else []
 
 
 def _fitted_misfit(robot: Robot, data: Dataset) -> float:
@@ -505,16 +507,16 @@ ROWS_UNRELATED: Final = Rule(
 
 def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
     """Say if the readings fit the joints no better than in an order that is drawn."""
-    given = _misfit(robot, data)
-    if given < _UNRELATED * _spread(data):
+    as_given = _misfit(robot, data)
+    if as_given < _UNRELATED * _spread(data):
         return []
     half = data.configurations // 2
     for part in (data.of_configurations(np.arange(half)), data.of_configurations(np.arange(half, data.configurations))):
-        if part.has_position.any() and _misfit(robot, part) * _LEAST_IMPROVEMENT < given:
+        if part.has_position.any() and _misfit(robot, part) * _LEAST_IMPROVEMENT < as_given:
             return []  # the robot or the instrument stands elsewhere in the other half
     rng = np.random.default_rng(0)
     drawn = (replace(data, joints=rng.permutation(data.joints)) for _ in range(_ORDERS_DRAWN))
-    if any(_ALIKE * _misfit(robot, other) <= given for other in drawn):
+    if any(_ALIKE * _misfit(robot, other) <= as_given for other in drawn):
         return [
             ROWS_UNRELATED(
                 "The readings do not follow the joint positions: in an order drawn at random they fit the robot as "
@@ -542,7 +544,7 @@ def _few_targets(data: Dataset) -> Dataset:
 
 
 def _only(data: Dataset, target: int) -> Dataset:
-    kept = (data.target == target) & data.has_position
+    chosen = (data.target == target) & data.has_position
 
-    some = data.of_readings(kept)
+    some = data.of_readings(chosen)
     return replace(some, target=np.zeros(len(some.target), dtype=np.intp), targets=(data.targets[target],))

@@ -85,8 +85,8 @@ class ErrorBudget:
     @property
     def remainder_is_chance(self) -> bool:
         """Whether the remainder lies within three of its standard deviations."""
-        rest = self.share("remainder")
-        return abs(rest.square or 0.0) <= _CHANCE * rest.deviation
+        remainder = self.share("remainder")
+        return abs(remainder.square or 0.0) <= _CHANCE * remainder.deviation
 
     def share(self, source: Source) -> Share:
         """Return what a source adds."""
@@ -153,7 +153,7 @@ def error_budget(
         return None
     covariance = np.sum([part.covariance for part in fit.covariance_parts], axis=0)
     root = covariance_root(fit, covariance)
-    taken, _ = seen.moved(covariance_root(fit, covariance, held=False))
+    taken, _ = seen.moved(covariance_root(fit, covariance, with_fixed=False))
     moved, moved_deviation = judged.moved(root)
     moved_deviation = math.hypot(moved_deviation, *_of_variances(fit, judged))
     table = table_motion(data)
@@ -216,7 +216,7 @@ def _part(fit: Fit, data: Dataset, kind: str) -> _Part | None:
     noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
     free = FreeParameters(tuple(fit.robot.parameters[name] for name in uncertain_names(fit)))
     problem = Problem(fit.robot, replace(data, setup=None), free, noise)
-    here = problem.at(free.start)
+    evaluation = problem.at(free.start)
     wanted = ("position",) if kind == "position" else _LENGTHS
     rows, sigmas, configurations, declared, first, readings = [], [], [], True, 0, 0
     for block in problem.blocks:
@@ -229,8 +229,8 @@ def _part(fit: Fit, data: Dataset, kind: str) -> _Part | None:
     if not readings:
         return None
     row, sigma = np.concatenate(rows), np.concatenate(sigmas)
-    J = here.jacobian[row] * sigma[:, None]
-    return _Part(here.residual[row] * sigma, sigma**2, J, np.concatenate(configurations), readings, declared)
+    J = evaluation.jacobian[row] * sigma[:, None]
+    return _Part(evaluation.residual[row] * sigma, sigma**2, J, np.concatenate(configurations), readings, declared)
 
 
 def _noise_deviation(fit: Fit, seen: _Part, judged: _Part) -> float:
@@ -253,7 +253,7 @@ def _scatter_of_all(fit: Fit, seen: _Part, taken: float) -> float:
 def _of_variances(fit: Fit, judged: _Part) -> Iterator[float]:
     """Yield what the share of the parameters is uncertain by for each variance that was estimated."""
     for part in fit.covariance_parts:
-        yield judged.moved(covariance_root(fit, part.covariance, held=False))[0] * math.sqrt(2.0 / part.freedom)
+        yield judged.moved(covariance_root(fit, part.covariance, with_fixed=False))[0] * math.sqrt(2.0 / part.freedom)
 
 
 def _instrument_words(fit: Fit, judged: _Part) -> str:
@@ -307,7 +307,7 @@ def _over_workspace(fit: Fit, expected: ExpectedError) -> tuple[Share, ...]:
         Share("parameters", float(squares.mean()), float(squares.std(ddof=1)), "from their covariance"),
         Share(
             "model",
-            expected.remainder**2,
+            expected.by_joint_error**2,
             0.0,
             "errors of the joints that the readings of a configuration share: what the model cannot express, and "
             "repeatability",

@@ -38,11 +38,11 @@ _LENGTHS: Final = 3_000_000
 #: Deviation of an angle from which the derivatives are compared with the kinematics themselves [rad].
 _LARGE_ANGLE: Final = 5e-3
 #: Share of the error by which the derivatives may be wrong, and what it is tried on.
-_BENT: Final = 0.05
+_CURVED: Final = 0.05
 _TRIED_DRAWS: Final = 12
 _TRIED_CONFIGURATIONS: Final = 40
 #: Share of the squared error from which what the model leaves makes the figure a lower bound.
-_REMAINDER: Final = 0.1
+_LEAST_BY_JOINTS: Final = 0.1
 #: Share of the equations that parameters leave to the residuals at least.
 _LEAST_LEFT: Final = 0.1
 #: Configurations of a map, however many targets there are.
@@ -75,7 +75,7 @@ class ExpectedError:
     #: Error of each joint in every visit that is in it, a standard deviation [rad or m]: repeatability plus what the
     #: model leaves.
     joint_error: Array
-    remainder: float  #: Root mean square of what that does to the targets.
+    by_joint_error: float  #: Root mean square of what that does to the targets.
     payload: Payload  #: What the robot carries there.
     located: bool  #: Whether a reading locates the robot; otherwise its base pose does not count.
     omissions: tuple[str, ...]  #: What the figures cannot contain, in words; they are lower bounds if there is any.
@@ -107,7 +107,7 @@ class PositionErrors:
         rng = np.random.default_rng(self.seed)
         errors, last = np.zeros((len(names), self.draws)), len(fit.covariance_parts) - 1
         for number, (part, scale) in enumerate(zip(fit.covariance_parts, self._scales, strict=True)):
-            root = covariance_root(fit, part.covariance, held=number == last)
+            root = covariance_root(fit, part.covariance, with_fixed=number == last)
             normal = rng.standard_normal((self.draws, root.shape[1]))
             if self.draws > 2 * root.shape[1]:
                 # So few draws have a covariance of their own: they are turned and stretched to the one they are of.
@@ -133,10 +133,10 @@ class PositionErrors:
         """Likewise of the errors of the joints, ``(draws, joints)``."""
         fit = self.fit
         chance = np.tile(self._chances[0], (len(fit.joint_error), 1))
-        for part, mine in zip(fit.covariance_parts, self._chances, strict=True):
-            chance[list(part.joints)] = mine
+        for part, part_chance in zip(fit.covariance_parts, self._chances, strict=True):
+            chance[list(part.joints)] = part_chance
         return np.stack(
-            [_student(known, mine) for known, mine in zip(fit.joint_freedom.tolist(), chance, strict=True)]
+            [_student(known, of_joint) for known, of_joint in zip(fit.joint_freedom.tolist(), chance, strict=True)]
         ).T
 
     @cached_property
@@ -147,7 +147,7 @@ class PositionErrors:
         return rng.permuted(evenly, axis=1)
 
     @cached_property
-    def _bent(self) -> bool:
+    def _is_curved(self) -> bool:
         """Whether the errors of angles are so large that derivatives would mislead."""
         fit = self.fit
         turned = [float(np.std(e)) for n, e in self._errors.items() if fit.robot.parameters[n].unit == "rad"]
@@ -156,8 +156,10 @@ class PositionErrors:
         rng = np.random.default_rng(self.seed)
         at = fit.robot.loaded(fit.robot.random_configurations(_TRIED_CONFIGURATIONS, rng))
         some = {name: error[:_TRIED_DRAWS] for name, error in self._errors.items()}
-        straight, bent = (np.stack([*_moves(fit, at, some, exact=exact)]) for exact in (False, True))
-        return bool(np.linalg.norm(bent - straight, axis=2).mean() > _BENT * np.linalg.norm(straight, axis=2).mean())
+        straight, curved = (np.stack([*_moves(fit, at, some, exact=exact)]) for exact in (False, True))
+        return bool(
+            np.linalg.norm(curved - straight, axis=2).mean() > _CURVED * np.linalg.norm(straight, axis=2).mean()
+        )
 
     def at(self, joints: Array) -> Array:
         """Return the lengths of the errors at joint positions ``(n, joints)``: ``(draws, targets, n)`` [m]."""
@@ -165,7 +167,7 @@ class PositionErrors:
         shape = (self.draws, len(joints), len(fit.joint_error))
         normal = np.random.default_rng((self.seed, 1)).standard_normal(shape) if fit.joint_error.any() else None
         shared = None if normal is None else normal * fit.joint_error * self._joint_scale[:, None]
-        moves: Iterable[Array] = _moves(fit, at, self._errors, shared, exact=self._bent)
+        moves: Iterable[Array] = _moves(fit, at, self._errors, shared, exact=self._is_curved)
         if fit.gauge_freedoms:
             moves = _without(_BASE if self.scale_counts else fit.gauge_freedoms, fit, at, np.stack([*moves]))
         return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
@@ -209,16 +211,16 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True, doubted: 
     overall = without_scale = _expectation(lengths.reshape(draws, -1))
     if "size" in fit.gauge_freedoms:
         without_scale = _expectation(PositionErrors(fit, draws, seed, scale_counts=False).at(joints).reshape(draws, -1))
-    remainder = _remainder(fit, joints)
+    by_joints = _error_by_joints(fit, joints)
     return ExpectedError(
         overall=overall,
         without_scale=without_scale,
         targets={t.name: _expectation(lengths[:, k]) for k, t in enumerate(robot.targets)},
         joint_error=fit.joint_error,
-        remainder=remainder,
+        by_joint_error=by_joints,
         payload=robot.payload,
         located=not fit.gauge_freedoms,
-        omissions=tuple(_omissions(fit, remainder, overall, plausible=plausible, doubted=doubted)),
+        omissions=tuple(_omissions(fit, by_joints, overall, plausible=plausible, doubted=doubted)),
     )
 
 
@@ -235,7 +237,7 @@ def as_residuals_allow(fit: Fit, data: Dataset) -> Fit:
     if not fit.joint_error.any() or fit.gauge_freedoms or not len(off):
         return fit
     some = np.linspace(0, data.configurations - 1, min(data.configurations, _CONFIGURATIONS[1])).round()
-    moved = _remainder(fit, data.postures.at(some.astype(np.intp)))
+    moved = _error_by_joints(fit, data.postures.at(some.astype(np.intp)))
     spent = sum(fit.robot.parameters[name].informed or 0.0 for name in fit.free.names)
     left = float(np.mean(off**2)) / max(1.0 - spent / (3 * len(off)), _LEAST_LEFT) - 3.0 * fit.sigma["position"] ** 2
     return replace(fit, joint_error=fit.joint_error * math.sqrt(min(max(left / moved**2, 0.0), 1.0)))
@@ -278,7 +280,7 @@ def _expectation(lengths: Array) -> Expectation:
     )
 
 
-def _remainder(fit: Fit, joints: Array | Postures) -> float:
+def _error_by_joints(fit: Fit, joints: Array | Postures) -> float:
     """Return the root mean square error of the targets that the joints' error of a visit makes [m]."""
     if not fit.joint_error.any():
         return 0.0
@@ -287,7 +289,7 @@ def _remainder(fit: Fit, joints: Array | Postures) -> float:
     return math.sqrt(float(np.mean([np.sum(J**2, axis=(0, 1)) for J in moved])))
 
 
-def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: bool, doubted: bool) -> Iterator[str]:
+def _omissions(fit: Fit, by_joints: float, overall: Expectation, *, plausible: bool, doubted: bool) -> Iterator[str]:
     """Say what the covariance cannot know."""
     if fit.status is Status.NOT_CONVERGED:
         yield "the fit did not converge"
@@ -297,11 +299,11 @@ def _omissions(fit: Fit, remainder: float, overall: Expectation, *, plausible: b
         yield "the robot's own geometry counts as exact"
     if fit.at_bound:
         yield "values at a bound count as exact"
-    if doubted and (fit.excess > 1.0 or remainder**2 > _REMAINDER * overall.mean**2):
+    if doubted and (fit.excess > 1.0 or by_joints**2 > _LEAST_BY_JOINTS * overall.mean**2):
         yield "readings are doubted, and what they do to the fit is in it only as far as they leave it unexplained"
     elif fit.excess > 1.0:
         yield "the residuals are larger than the declared deviations, and what makes them so may do more elsewhere"
-    elif remainder**2 > _REMAINDER * overall.mean**2:
+    elif by_joints**2 > _LEAST_BY_JOINTS * overall.mean**2:
         yield "what the model cannot express is in it only as far as it was seen where the robot was measured"
 
 
@@ -320,7 +322,7 @@ def uncertain_names(fit: Fit) -> tuple[str, ...]:
     return (*fit.free.names, *fit.unfitted, *(r.dropped for r in fit.redundancies))
 
 
-def covariance_root(fit: Fit, covariance: Array, *, held: bool = True) -> Array:
+def covariance_root(fit: Fit, covariance: Array, *, with_fixed: bool = True) -> Array:
     """Return a root ``(parameters, rank)`` of a covariance, for the parameters of :func:`uncertain_names`.
 
     Where there were no priors, parameters that the data do not tell apart from others were held. They are off by what
@@ -329,20 +331,20 @@ def covariance_root(fit: Fit, covariance: Array, *, held: bool = True) -> Array:
 
     Args:
         covariance: Of the free parameters and the unfitted ones, ``(free, free)``.
-        held: Whether that of the held ones is added.
+        with_fixed: Whether that of the held ones is added.
     """
     names = uncertain_names(fit)
     size = np.array([fit.start.parameters[name].prior for name in names])
     count = len(fit.free.names) + len(fit.unfitted)
     whole = np.zeros((len(names), len(names)))
     whole[:count, :count] = covariance / np.outer(size[:count], size[:count])
-    if fit.redundancies and held:
-        whole += _held_back(fit, names, size)
+    if fit.redundancies and with_fixed:
+        whole += _fixed_covariance(fit, names, size)
     value, direction = np.linalg.eigh(whole)
     return np.asarray(size[:, None] * direction * np.sqrt(np.maximum(value, 0.0)))
 
 
-def _held_back(fit: Fit, names: tuple[str, ...], size: Array) -> Array:
+def _fixed_covariance(fit: Fit, names: tuple[str, ...], size: Array) -> Array:
     """Return the covariance along the combinations that were held, per prior, ``(parameters, parameters)``."""
     index = {name: place for place, name in enumerate(names)}
     along = np.zeros((len(fit.redundancies), len(names)))
@@ -372,8 +374,8 @@ def _moves(
         if exactly is not None:
             move = np.moveaxis(next(exactly).position, 1, 0) - kinematics.position
         else:
-            here = set(target.chain.parameters)
-            own = [n for n in errors if n in here or robot.parameters[n].group not in ("target", "fixture")]
+            own_names = set(target.chain.parameters)
+            own = [n for n in errors if n in own_names or robot.parameters[n].group not in ("target", "fixture")]
             J = robot.position_jacobian(kinematics, at, own).reshape(len(own), -1)
             move = (np.stack([errors[name] for name in own]).T @ J).reshape(draws, 3, len(at))
         if shared is not None:

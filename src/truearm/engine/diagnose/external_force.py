@@ -101,24 +101,24 @@ def check_force(cases: Sequence[tuple[Robot, Array | Postures]]) -> list[Notice]
     if not acting:
         return []
     robot = acting[0][0]
-    bent = [_bending(arm, at) for arm, at in acting]
-    made = [*_turned([arm for arm, _ in acting]), *_rated([arm for arm, _ in acting])]
-    if all(one.rigid for one in bent):
+    bendings = [_bending(arm, at) for arm, at in acting]
+    notices = [*_turned([arm for arm, _ in acting]), *_rated([arm for arm, _ in acting])]
+    if all(bending.rigid for bending in bendings):
         return [
             FORCE_ON_RIGID_MODEL(
                 "The model has no joints that give way, so the force at the tool changes nothing in it, and the real "
                 "arm bends."
             ),
-            *made,
+            *notices,
         ]
-    worst = max(bent, key=lambda one: one.moved)
-    known = [one.uncertain for one in bent if one.uncertain is not None]
+    worst = max(bendings, key=lambda bending: bending.moved)
+    known = [bending.uncertain for bending in bendings if bending.uncertain is not None]
     well = f", which is known to {max(known) * 1e3:.2g} mm (standard deviation)" if known else ""
-    made.insert(
+    notices.insert(
         0,
         FORCE_TAKEN(f"The force at the tool moves its tip by up to {worst.moved * 1e3:.3g} mm{well}."),
     )
-    return [*_unseen(robot, bent), *_beyond(robot, bent), *made]
+    return [*_unseen(robot, bendings), *_beyond(robot, bendings), *notices]
 
 
 def _pushed(robot: Robot, at: Postures) -> bool:
@@ -136,7 +136,7 @@ def _bending(robot: Robot, at: Postures) -> _Bending:
     free, at_rest = robot.with_wrench(None), replace(at, wrench=None, loads=None)
     with_force, without = joint_efforts(robot, at), joint_efforts(free, at_rest)
     tip = np.array(IDENTITY.translation if robot.wrench is None else robot.wrench.tool.translation)
-    (places, by_parameter), (before, before_by) = (_tips(*one, tip) for one in ((robot, at), (free, at_rest)))
+    (places, by_parameter), (before, before_by) = (_tips(*case, tip) for case in ((robot, at), (free, at_rest)))
     moved = float(np.linalg.norm(places - before, axis=1).max())
     change = by_parameter - before_by
     names = [p.name for p in _elastic(robot)]
@@ -206,17 +206,17 @@ COMPLIANCE_UNSEEN: Final = Rule(
 )
 
 
-def _unseen(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
-    found: dict[str, float] = {}
-    for bending in bent:
+def _unseen(robot: Robot, bendings: Sequence[_Bending]) -> list[Notice]:
+    largest: dict[str, float] = {}
+    for bending in bendings:
         for name, size in bending.unseen.items():
-            found[name] = max(size, found.get(name, 0.0))
-    if not found:
+            largest[name] = max(size, largest.get(name, 0.0))
+    if not largest:
         return []
-    names = sorted(found, key=lambda name: -found[name])
-    words = ", ".join(f"{name} ({found[name] * 1e3:.2g} mm)" for name in names[:_LISTED])
+    names = sorted(largest, key=lambda name: -largest[name])
+    words = ", ".join(f"{name} ({largest[name] * 1e3:.2g} mm)" for name in names[:_LISTED])
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    loads = np.max([one.efforts for one in bent], axis=0)
+    loads = np.max([case.efforts for case in bendings], axis=0)
     joints = [i for i in range(len(robot.joints)) if any(name.split("_")[-1] == str(i + 1) for name in names)]
     carried = ", ".join(_load(robot, i, float(loads[i])) for i in joints)
     on_joints = f" It loads {carried}." if carried else ""
@@ -237,19 +237,19 @@ LOADS_BEYOND_DATA: Final = Rule(
 )
 
 
-def _beyond(robot: Robot, bent: Sequence[_Bending]) -> list[Notice]:
-    unseen = {name for one in bent for name in one.unseen}
-    found: dict[int, float] = {}
-    for bending in bent:
+def _beyond(robot: Robot, bendings: Sequence[_Bending]) -> list[Notice]:
+    unseen = {name for case in bendings for name in case.unseen}
+    beyond: dict[int, float] = {}
+    for bending in bendings:
         for joint, load in bending.beyond.items():
-            if f"compliance_{joint + 1}" not in unseen and abs(load) > abs(found.get(joint, 0.0)):
-                found[joint] = load
-    if not found or robot.proof is None:
+            if f"compliance_{joint + 1}" not in unseen and abs(load) > abs(beyond.get(joint, 0.0)):
+                beyond[joint] = load
+    if not beyond or robot.proof is None:
         return []
     ranges = robot.proof.loads
     words = ", ".join(
         f"{_load(robot, i, load)} (measured with {ranges[i][0]:.3g} to {ranges[i][1]:.3g})"
-        for i, load in sorted(found.items())
+        for i, load in sorted(beyond.items())
     )
     return [
         LOADS_BEYOND_DATA(

@@ -27,7 +27,7 @@ from truearm.engine.data.rigid_tool import (
 from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import repeated_joints
 from truearm.engine.diagnose.entry_error_trials import (
-    ORIENTATION_ENTRY_ERRORS,
+    ORIENTATION_ORDER,
     UNIT_ANGLE,
     EntryError,
     angle_entry_errors,
@@ -85,10 +85,12 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
     for c in dict.fromkeys(data.configuration[doubted].tolist()):
         if c in mistaken or c in angled or c in turned_round or data.labels[c] in repeated:
             continue
-        mine = [r for r in doubted.tolist() if data.configuration[r] == c]
-        of_this = [_doubted(data, r, predicted[c], points, known, float(off[r]), allowed) for r in mine]
-        if all(one.rule == OUTLIERS for one in of_this) and _hang_together(data, c, mine, predicted, turned, allowed):
-            unlike[c] = float(off[mine].max())
+        rows = [r for r in doubted.tolist() if data.configuration[r] == c]
+        of_this = [_doubted(data, r, predicted[c], points, known, float(off[r]), allowed) for r in rows]
+        if all(doubt.rule == OUTLIERS for doubt in of_this) and _hang_together(
+            data, c, rows, predicted, turned, allowed
+        ):
+            unlike[c] = float(off[rows].max())
         else:
             suspects += of_this
     return [*scaled, *entries, *_joints_mistaken(data, mistaken, turned_round, unlike)], suspects
@@ -108,8 +110,8 @@ def _doubted(
     gaps = np.linalg.norm(predicted - at, axis=1)
     nearest = int(np.argmin(gaps))
     if nearest != t and gaps[nearest] <= allowed:
-        there = points.of(c, nearest)
-        exchanged = there is not None and np.linalg.norm(there - predicted[t]) <= allowed
+        measured = points.of(c, nearest)
+        exchanged = measured is not None and np.linalg.norm(measured - predicted[t]) <= allowed
         rule = TARGETS_SWAPPED if exchanged else TARGET_MISTAKEN
         return Suspect(rule, label, name, f"is target {data.targets[nearest]}")
     before = points.of(c - 1, t)
@@ -125,13 +127,13 @@ def _hang_together(
     Args:
         predicted: Places of the targets [m], ``(configurations, targets, 3)``.
     """
-    mine = np.flatnonzero((data.configuration == c) & data.has_position)
-    if len(mine) != len(doubted):
+    rows = np.flatnonzero((data.configuration == c) & data.has_position)
+    if len(rows) != len(doubted):
         return False
-    if turned[mine].all():
+    if turned[rows].all():
         return True
-    read, there = data.position[mine], predicted[c, data.target[mine]]
-    apart = [np.linalg.norm(points[:, None] - points, axis=2) for points in (read, there)]
+    read, expected = data.position[rows], predicted[c, data.target[rows]]
+    apart = [np.linalg.norm(points[:, None] - points, axis=2) for points in (read, expected)]
     return bool(apart[1].max() > _LONG * allowed and np.abs(apart[0] - apart[1]).max() <= allowed)
 
 
@@ -143,8 +145,8 @@ def _in_another_length(data: Dataset, predicted: Array, doubted: IntArray, allow
         doubted: The readings that are far off.
     """
     factors = np.ones(len(data.target))
-    there = predicted[data.configuration[doubted], data.target[doubted]]
-    factors[doubted] = factors_of(data.position[doubted], there, allowed)
+    expected = predicted[data.configuration[doubted], data.target[doubted]]
+    factors[doubted] = factors_of(data.position[doubted], expected, allowed)
     return replace(data, position=data.position * factors[:, None]), factors
 
 
@@ -158,19 +160,19 @@ def _in_another_unit(
         doubted: The readings that are far off.
         left_out: Configurations that are explained.
     """
-    found: dict[str, list[int]] = {}
+    by_unit: dict[str, list[int]] = {}
     explained: set[int] = set()
     for entry, fitting in _explained_by(fit, data, off, doubted, allowed, left_out, angle_entry_errors):
         new = [c for c in fitting if c not in explained]
         explained.update(new)
         if new:
-            found.setdefault(entry.words.partition(".")[0], []).extend(new)
+            by_unit.setdefault(entry.words.partition(".")[0], []).extend(new)
     return explained, [
         UNIT_ANGLE(
             f"{words}, at some configurations alone ({listed([data.labels[c] for c in sorted(cs)])}).",
             at=tuple((data.labels[c], "") for c in sorted(cs)),
         )
-        for words, cs in found.items()
+        for words, cs in by_unit.items()
     ]
 
 
@@ -178,12 +180,12 @@ def _of_another_sign(
     fit: Fit, data: Dataset, off: Array, doubted: IntArray, allowed: float, left_out: list[int]
 ) -> dict[int, int]:
     """Return the configurations whose readings fit with the opposite sign of one joint alone, and its number from 1."""
-    found: dict[int, list[int]] = {}
+    candidates: dict[int, list[int]] = {}
     entries = _explained_by(fit, data, off, doubted, allowed, left_out, sign_entry_errors)
     for number, (_, fitting) in enumerate(entries, 1):
         for c in fitting:
-            found.setdefault(c, []).append(number)
-    return {c: numbers[0] for c, numbers in found.items() if len(numbers) == 1}
+            candidates.setdefault(c, []).append(number)
+    return {c: numbers[0] for c, numbers in candidates.items() if len(numbers) == 1}
 
 
 def _explained_by(
@@ -229,30 +231,31 @@ def _joints_mistaken(
         signs: Those whose readings fit with the opposite sign of a joint, and of which.
         unlike: Those whose readings hang together and are elsewhere, and how far [m].
     """
-    found = []
+    sentences = []
     if others:
         words = [f"{data.labels[c]} (those of {data.labels[k]})" for c, k in others.items()]
-        what = "readings of a configuration fit" if len(words) == 1 else "readings of configurations fit"
-        found.append(
-            f"The {what} the joint positions of another one: {listed(words)}. Their rows were exchanged or copied: "
+        subject = "readings of a configuration fit" if len(words) == 1 else "readings of configurations fit"
+        sentences.append(
+            f"The {subject} the joint positions of another one: {listed(words)}. Their rows were exchanged or copied: "
             "fix the joint positions, or leave them out."
         )
     if signs:
         words = [f"{data.labels[c]} (joint {number})" for c, number in signs.items()]
-        what = f"configuration{'' if len(words) == 1 else 's'} {listed(words)}"
-        found.append(
-            f"The readings of {what} fit with the opposite sign of this joint: fix it in these rows, or leave them out."
+        subject = f"configuration{'' if len(words) == 1 else 's'} {listed(words)}"
+        sentences.append(
+            f"The readings of {subject} fit with the opposite sign of this joint: fix it in these rows, or leave them "
+            "out."
         )
     if unlike:
         words = [f"{data.labels[c]} ({millimetres(size)} mm off)" for c, size in unlike.items()]
-        what = f"configuration{'' if len(words) == 1 else 's'} {listed(words)}"
-        found.append(
-            f"The joint positions of {what} do not belong to their readings: all of these are off, and stand to each "
-            "other as they should. The joint positions are wrong, or the row is another one's, or the robot or the "
-            "instrument was moved for it. Fix the joint positions, or leave these rows out."
+        subject = f"configuration{'' if len(words) == 1 else 's'} {listed(words)}"
+        sentences.append(
+            f"The joint positions of {subject} do not belong to their readings: all of these are off, and stand to "
+            "each other as they should. The joint positions are wrong, or the row is another one's, or the robot or "
+            "the instrument was moved for it. Fix the joint positions, or leave these rows out."
         )
     at = tuple((data.labels[c], "") for c in (*others, *signs, *unlike))
-    return [JOINTS_MISTAKEN(" ".join(found), at=at)] if found else []
+    return [JOINTS_MISTAKEN(" ".join(sentences), at=at)] if sentences else []
 
 
 def allowed_off(off: Array) -> float:
@@ -277,7 +280,7 @@ def often_off(data: Dataset, off: Array) -> list[Notice]:
         OUTLIERS(
             f"{len(far)} of {read} readings ({len(far) / read:.0%}) are more than {_OFTEN_RATIO:g} times farther off "
             f"than half of all, up to {float(size[far].max()) * 1e3:.2g} mm (configuration/target): "
-            f"{listed(['/'.join(one) for one in at])}. "
+            f"{listed(['/'.join(pair) for pair in at])}. "
             "Errors of instruments and joints are not so uneven.",
             at=at,
         )
@@ -292,16 +295,16 @@ def _joints_of_others(data: Dataset, predicted: Array, doubted: IntArray, allowe
     """
     off = np.zeros(len(data.target), dtype=bool)
     off[doubted] = True
-    found = {}
+    others = {}
     for c in np.unique(data.configuration[doubted]).tolist()[:_MOST_LOOKED_AT]:
-        mine = np.flatnonzero((data.configuration == c) & data.has_position)
-        if not off[mine].all():
+        rows = np.flatnonzero((data.configuration == c) & data.has_position)
+        if not off[rows].all():
             continue
-        gaps = np.linalg.norm(predicted[:, data.target[mine]] - data.position[mine], axis=2).max(axis=1)
+        gaps = np.linalg.norm(predicted[:, data.target[rows]] - data.position[rows], axis=2).max(axis=1)
         nearest = int(np.argmin(gaps))
         if gaps[nearest] <= allowed:
-            found[c] = nearest
-    return found
+            others[c] = nearest
+    return others
 
 
 ORIENTATION_OUTLIERS: Final = Rule(
@@ -310,9 +313,7 @@ ORIENTATION_OUTLIERS: Final = Rule(
     "[orientations far off](check.md#single-orientations-that-are-off) whose positions are not",
 )
 #: Codes of wrong readings that pull a fit away.
-PULLING: Final = frozenset(
-    rule.code for rule in (ORIENTATION_OUTLIERS, *ORIENTATION_ENTRY_ERRORS, JOINTS_MISTAKEN, UNIT_ANGLE)
-)
+PULLING: Final = frozenset(rule.code for rule in (ORIENTATION_OUTLIERS, ORIENTATION_ORDER, JOINTS_MISTAKEN, UNIT_ANGLE))
 #: An orientation is doubted if it is at least so far off [rad].
 _LEAST_TURNED: Final = math.radians(0.5)
 #: A joint turns a reading alike if the turn is about its axis but for this share, and hardly moves it if the target is
@@ -346,37 +347,39 @@ def check_orientations(fit: Fit, data: Dataset, errors: Errors, doubted: NDArray
     rows = np.flatnonzero(doubted)
     predicted = np.empty((len(rows), 3, 3))
     for t in np.unique(data.target[rows]).tolist():
-        mine = data.target[rows] == t
-        predicted[mine] = fit.robot.world_poses(data.postures, data.targets[t])[1][data.configuration[rows[mine]]]
-    corrected, rule, words = entry_errors_in_rows(data.quaternion[rows], predicted)
+        of_target = data.target[rows] == t
+        predicted[of_target] = fit.robot.world_poses(data.postures, data.targets[t])[1][
+            data.configuration[rows[of_target]]
+        ]
+    corrected, words = entry_errors_in_rows(data.quaternion[rows], predicted)
     at = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in rows.tolist()]
-    where = ["/".join(one) for one in at]
-    found = []
+    labels = ["/".join(pair) for pair in at]
+    notices = []
     if corrected.any():
-        some = listed([name for name, one in zip(where, corrected.tolist(), strict=True) if one])
-        found.append(
-            rule(
+        some = listed([name for name, is_corrected in zip(labels, corrected.tolist(), strict=True) if is_corrected])
+        notices.append(
+            ORIENTATION_ORDER(
                 f"Some orientations do not turn as the robot does (configuration/target): {some}. They would if their "
                 f"numbers were read otherwise: {words}. Those of the other readings are right. Fix these rows.",
                 "error",
-                at=tuple(one for one, known in zip(at, corrected.tolist(), strict=True) if known),
+                at=tuple(pair for pair, known in zip(at, corrected.tolist(), strict=True) if known),
             )
         )
     if not corrected.all():
         size = np.linalg.norm(errors.orientation_errors[rows], axis=1).tolist()
         joint = [_as_if_turned(fit, data, r, errors.orientation_errors[r]) for r in rows.tolist()]
-        others = [f"{where[i]} ({degrees(size[i])} deg{joint[i]})" for i in np.flatnonzero(~corrected).tolist()]
-        one = len(others) == 1
-        what, them = ("orientation is", "it") if one else ("orientations are", "them")
-        quaternions = "its quaternion" if one else "their quaternions"
-        found.append(
+        others = [f"{labels[i]} ({degrees(size[i])} deg{joint[i]})" for i in np.flatnonzero(~corrected).tolist()]
+        is_single = len(others) == 1
+        subject, them = ("orientation is", "it") if is_single else ("orientations are", "them")
+        quaternions = "its quaternion" if is_single else "their quaternions"
+        notices.append(
             ORIENTATION_OUTLIERS(
-                f"{len(others)} {what} far off, and the positions are not (configuration/target): {listed(others)}. "
+                f"{len(others)} {subject} far off, and the positions are not (configuration/target): {listed(others)}. "
                 f"Measure {them} again, or leave {quaternions} empty; `loss=cauchy` lets {them} count little.",
                 at=tuple(at[i] for i in np.flatnonzero(~corrected).tolist()),
             )
         )
-    return found
+    return notices
 
 
 def _as_if_turned(fit: Fit, data: Dataset, reading: int, by: Array) -> str:
@@ -385,8 +388,8 @@ def _as_if_turned(fit: Fit, data: Dataset, reading: int, by: Array) -> str:
     Args:
         by: What the orientation is off by, as a rotation vector [rad], ``(3,)``.
     """
-    one = data.of_configurations(data.configuration[[reading]])
-    moves = fit.robot.joint_jacobian(one.postures, data.targets[data.target[reading]])[0]
+    single = data.of_configurations(data.configuration[[reading]])
+    moves = fit.robot.joint_jacobian(single.postures, data.targets[data.target[reading]])[0]
     for number, (linear, angular) in enumerate(zip(moves[:3].T, moves[3:].T, strict=True), 1):
         angle = float(by @ angular)
         if np.linalg.norm(by - angle * angular) < _ALIKE * abs(angle) and np.linalg.norm(linear) < _ON_THE_AXIS:

@@ -107,8 +107,8 @@ def signed_rank_probability(differences: Array) -> float:
     d = differences[differences != 0.0]
     if not len(d):
         return 1.0
-    which, count = np.unique(np.abs(d), return_inverse=True, return_counts=True)[1:]
-    ranks = (2 * np.cumsum(count) - count + 1)[which]  # twice the mean rank: whole numbers
+    group, count = np.unique(np.abs(d), return_inverse=True, return_counts=True)[1:]
+    ranks = (2 * np.cumsum(count) - count + 1)[group]  # twice the mean rank: whole numbers
     reached = int(ranks[d > 0.0].sum())
     if len(d) > _MANY:
         mean, deviation = ranks.sum() / 2.0, math.sqrt(float(ranks @ ranks)) / 2.0
@@ -128,8 +128,8 @@ def _by_posture(errors: Errors, data: Dataset) -> Array:
         off = np.abs(errors.length_errors)
     read = np.flatnonzero(np.isfinite(off))
     joints = np.round(data.joints[data.configuration[read]] / _SAME)
-    which, count = np.unique(joints, axis=0, return_inverse=True, return_counts=True)[1:]
-    return np.asarray(np.bincount(which.reshape(-1), off[read]) / count)
+    group, count = np.unique(joints, axis=0, return_inverse=True, return_counts=True)[1:]
+    return np.asarray(np.bincount(group.reshape(-1), off[read]) / count)
 
 
 #: Joint positions that differ by less are the same [rad or m].

@@ -146,7 +146,7 @@ def check_narrow_data_without_geometry(
         return []
     model = named_model("geometric").also([e for e in fit.model.effects if e not in named_model("geometric").effects])
     nominal = fit.robot.with_values({name: p.nominal for name, p in fit.start.parameters.items()})
-    wider = identify(nominal, measured, model, loss=loss, held=fit.held)
+    wider = identify(nominal, measured, model, loss=loss, fixed=fit.fixed)
     expected = expected_error(as_residuals_allow(wider, measured))
     apart = _apart(fit, wider)
     low, high = expected.without_scale.interval_90
@@ -229,15 +229,15 @@ def _beyond_curves(fit: Fit, expected: ExpectedError, measured: Dataset, known: 
     mean, (low, high) = expected.overall.mean, expected.overall.interval_90
     if not has_curves(fit) or not few or fit.gauge_freedoms or mean <= max(known, _NEGLIGIBLE):
         return []
-    there = expected_where_measured(fit, measured)
-    if mean <= _WARNING * there:
+    at_measured = expected_where_measured(fit, measured)
+    if mean <= _WARNING * at_measured:
         return []
     return [
         NARROW_DATA(
             f"Over the workspace the targets are expected to be off by {_mm(mean)} mm on average (90 %: {_mm(low)} to "
-            f"{_mm(high)}), at configurations like those measured by {_mm(there)} mm, both without the noise of a "
-            "reading: curves of joints are known only where these were measured. Measure configurations in which these "
-            f"joints move further: {'; '.join(few)}."
+            f"{_mm(high)}), at configurations like those measured by {_mm(at_measured)} mm, both without the noise of "
+            "a reading: curves of joints are known only where these were measured. Measure configurations in which "
+            f"these joints move further: {'; '.join(few)}."
         )
     ]
 
@@ -250,7 +250,7 @@ def expected_where_measured(fit: Fit, measured: Dataset) -> float:
 
 def joints_that_moved_little(fit: Fit, measured: Dataset) -> list[str]:
     """Return the joints that moved over less than half of what their limits allow, in words, the worst first."""
-    found = []
+    narrow = []
     for number, joint in enumerate(fit.robot.joints):
         low, high = joint.range
         seen = measured.joints[:, number]
@@ -260,8 +260,8 @@ def joints_that_moved_little(fit: Fit, measured: Dataset) -> list[str]:
             unit = SHOWN_AS["m" if joint.kind == "prismatic" else "rad"]
             texts = [f"{from_si(value, unit):.0f}" for value in (seen.min(), seen.max(), low, high)]
             limits = f"limits {texts[2]} to {texts[3]}" if joint.limits else "no limits"
-            found.append((share, f"{joint.name} (measured {texts[0]} to {texts[1]} {unit}, {limits})"))
-    return [text for _, text in sorted(found)]
+            narrow.append((share, f"{joint.name} (measured {texts[0]} to {texts[1]} {unit}, {limits})"))
+    return [text for _, text in sorted(narrow)]
 
 
 def least_known(fit: Fit) -> str:

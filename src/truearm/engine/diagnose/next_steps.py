@@ -58,35 +58,35 @@ def measured_again(left: LeftOver, off: Off, known: float, *, checked: bool) -> 
     if off.in_a_row:
         names = [left.problem.data.labels[index] for index in sorted(off.indices)]
         size = math.sqrt(sum(configuration.distance**2 for configuration in off.configurations) / len(names))
-        how = "them out of the calibration" if checked else f"them out (`without={labels}`)"
+        leaving = "them out of the calibration" if checked else f"them out (`without={labels}`)"
         words = (
-            f"Measure configurations {names[0]} to {names[-1]} again, or leave {how}: they were measured one after the "
-            f"other and are off by about {size * 1e3:.2g} mm, so something moved meanwhile."
+            f"Measure configurations {names[0]} to {names[-1]} again, or leave {leaving}: they were measured one after "
+            f"the other and are off by about {size * 1e3:.2g} mm, so something moved meanwhile."
         )
         return [NextStep("measure-again", words, gain)]
-    said = [_off_by(left, configuration) for configuration in off.configurations[:_NAMED]]
-    rest = len(off.configurations) - len(said)
-    if rest:
+    items = [_off_by(left, configuration) for configuration in off.configurations[:_NAMED]]
+    more = len(off.configurations) - len(items)
+    if more:
         others = [left.problem.data.labels[configuration.index] for configuration in off.configurations[_NAMED:]]
-        said.append(f"{counted(rest, 'more configuration')} ({listed(others)})")
+        items.append(f"{counted(more, 'more configuration')} ({listed(others)})")
     out = "leave them out" if len(off.configurations) > 1 else "leave it out"
     way = f"{out} of the calibration" if checked else f"{out} (`without={labels}`)"
-    what = "Measure these again" if len(off.configurations) > 1 else "Measure again"
-    return [NextStep("measure-again", f"{what}, or {way}: {'; '.join(said)}.", gain)]
+    start = "Measure these again" if len(off.configurations) > 1 else "Measure again"
+    return [NextStep("measure-again", f"{start}, or {way}: {'; '.join(items)}.", gain)]
 
 
 def _off_by(left: LeftOver, off: OffConfiguration) -> str:
     """Say what is wrong with a configuration."""
     label = left.problem.data.labels[off.index]
     if off.joint is not None:
-        which = f"joint {off.joint.number} of configuration {label}"
+        joint = f"joint {off.joint.number} of configuration {label}"
         if off.joint.sign:
-            return f"the sign of {which} looks wrong"
+            return f"the sign of {joint} looks wrong"
         turns = left.fit.robot.joints[off.joint.number - 1].kind == "revolute"
         size = f"{math.degrees(abs(off.joint.error)):.2g} deg" if turns else f"{abs(off.joint.error) * 1e3:.2g} mm"
-        return f"{which} looks off by about {size}"
-    where = f"target {off.target} of " if off.target else ""
-    return f"{where}configuration {label} is off by {off.distance * 1e3:.2g} mm"
+        return f"{joint} looks off by about {size}"
+    of_target = f"target {off.target} of " if off.target else ""
+    return f"{of_target}configuration {label} is off by {off.distance * 1e3:.2g} mm"
 
 
 def about_change(left: LeftOver, change: Change, known: float) -> NextStep:
@@ -96,52 +96,52 @@ def about_change(left: LeftOver, change: Change, known: float) -> NextStep:
     words = {
         "instrument-moved": f"The instrument or the robot's base moved before configuration {label}: name it in "
         f"`base_changes={label}`, or measure again from there.",
-        "target-moved": f"Target {change.what} was seated anew before configuration {label}: give it another name from "
-        "there on.",
-        "joint-zero-jumped": f"The zero of joint {change.what} jumped before configuration {label}: find out why, and "
-        "measure again from there or calibrate the parts apart.",
+        "target-moved": f"Target {change.subject} was seated anew before configuration {label}: give it another name "
+        "from there on.",
+        "joint-zero-jumped": f"The zero of joint {change.subject} jumped before configuration {label}: find out why, "
+        "and measure again from there or calibrate the parts apart.",
         "drift": "Everything drifted during the campaign: measure reference points along with the targets, or let the "
         "arm and the instrument warm up first.",
     }
     return NextStep(change.kind, words[change.kind], gain)
 
 
-def other_model(fit: Fit, found: Explanation, known: float) -> NextStep:
+def other_model(fit: Fit, candidate: Explanation, known: float) -> NextStep:
     """Return the step for what would explain what is left."""
-    gain = known * (1.0 - found.left)
-    share = f"{1.0 - found.left:.0%}"
-    if found.cause == PAYLOAD:
-        given = fit.robot.payload.mass
-        what = f"about {found.mass:.2g} kg" if found.mass else "another load"
+    gain = known * (1.0 - candidate.left)
+    share = f"{1.0 - candidate.left:.0%}"
+    if candidate.cause == PAYLOAD:
+        stated = fit.robot.payload.mass
+        mass = f"about {candidate.mass:.2g} kg" if candidate.mass else "another load"
         words = (
-            f"Check what the robot carried (`payload`) and the masses in the robot file: {what} on the flange instead "
-            f"of {given:g} kg would explain {share} of what is left."
-            if given
-            else f"Give what the robot carried (`payload`): {what} on the flange instead of none would explain {share} "
+            f"Check what the robot carried (`payload`) and the masses in the robot file: {mass} on the flange instead "
+            f"of {stated:g} kg would explain {share} of what is left."
+            if stated
+            else f"Give what the robot carried (`payload`): {mass} on the flange instead of none would explain {share} "
             "of what is left."
         )
         return NextStep("give-payload", words, gain)
-    if found.cause == LOADS:
+    if candidate.cause == LOADS:
         words = (
             f"Joints that give way explain {share} of what is left, but the robot has no masses: give masses in the "
             "robot file or what it carried (`payload`), and use `model=elastic`."
         )
         return NextStep("give-loads", words, gain)
-    if found.cause == GEOMETRY:
+    if candidate.cause == GEOMETRY:
         words = f"Use `model=geometric`: free geometry and joint zeros explain {share} of what is left."
         return NextStep("other-model", words, gain)
     plain = "geometry" in fit.model.groups and not fit.model.effects
-    if found.cause == "compliance" and plain:
+    if candidate.cause == "compliance" and plain:
         return NextStep(
             "other-model", f"Use `model=elastic`: joints that give way explain {share} of what is left.", gain
         )
-    if found.cause == Fourier.name:
+    if candidate.cause == Fourier.name:
         words = (
-            f"Add `effects={found.cause}`, or `effects={JointCurve.name}`, which contains it and is found from some "
-            f"100 configurations on, or let `model=auto` choose: it explains {share} of what is left."
+            f"Add `effects={candidate.cause}`, or `effects={JointCurve.name}`, which contains it and is found from "
+            f"some 100 configurations on, or let `model=auto` choose: it explains {share} of what is left."
         )
         return NextStep("other-model", words, gain)
-    words = f"Add `effects={found.cause}`, or let `model=auto` choose: it explains {share} of what is left."
+    words = f"Add `effects={candidate.cause}`, or let `model=auto` choose: it explains {share} of what is left."
     return NextStep("other-model", words, gain)
 
 
@@ -208,21 +208,21 @@ def steps_after_fit(case: Case, notices: Sequence[Notice]) -> tuple[NextStep, ..
     if first:
         return tuple(first)
     left, known = case.left, _known(case.errors)
-    steps, now = _of_left_over(left, case.off, case.moved, known, checked=False)
-    bound = _at_bound(case, now)
+    steps, remaining = _of_left_over(left, case.off, case.moved, known, checked=False)
+    bound = _at_bound(case, remaining)
     spoiled = (
         case.moved is not None
         or any(step.gain is not None for step in bound)
         or any(step.code == "measure-again" for step in steps)
     )
     if case.status is not Status.RANK_LOSS and not spoiled:
-        steps += _after(steps, _more(case, notices, now))
+        steps += _after(steps, _more(case, notices, remaining))
     steps += _cures(notices, steps)
     steps += bound
     if not case.held_out:
         steps.append(NextStep("hold-out", "Hold configurations out to judge the fit: leave `train=all` out."))
     if case.status is Status.RANK_LOSS:
-        more = NextStep("measure-more", _where(case, f"determine {listed(left.fit.unobservable)}"))
+        more = NextStep("measure-more", _where_to_measure(case, f"determine {listed(left.fit.unobservable)}"))
         return (more, *most_useful_first(steps))[:MOST]
     if any(notice.code == FEW_READINGS.code for notice in notices):
         more = NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters take up.")
@@ -253,8 +253,8 @@ def steps_after_check(
     elif not robot:
         steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
     elif not any(step.code in ("other-model", "give-loads") for step in steps):
-        told = left is not None and can_explain(left)
-        also = ": no joint effect would explain more of the readings" if told else ""
+        explainable = left is not None and can_explain(left)
+        also = ": no joint effect would explain more of the readings" if explainable else ""
         steps.append(NextStep("calibrate", f"Calibrate with `model=geometric`{also}."))
     return most_useful_first(steps)
 
@@ -263,30 +263,30 @@ def _of_left_over(
     left: LeftOver, off: Off, moved: tuple[LeftOver, Change] | None, known: float, *, checked: bool
 ) -> tuple[list[NextStep], float]:
     """Return what to do about what a fit leaves, and the error without configurations that are off [m]."""
-    found = explanation(left, off.indices)
+    candidate = explanation(left, off.indices)
     share, wider, known_moved = 1.0, left, known
-    if found is not None and (off.configurations or found.left < _HIDING):
+    if candidate is not None and (off.configurations or candidate.left < _HIDING):
         # What a model lacks may be large at a few configurations, which are then not wrong, and hide others that are.
-        wider = with_causes(left, GEOMETRY, "compliance", LOADS, found.cause)
-    if found is not None and wider is not left:
+        wider = with_causes(left, GEOMETRY, "compliance", LOADS, candidate.cause)
+    if candidate is not None and wider is not left:
         still = off_configurations(wider)
-        share = 1.0 if off.configurations else found.left
+        share = 1.0 if off.configurations else candidate.left
         if set(still.indices) - set(off.indices):
-            found = explanation(left, still.indices) or found
+            candidate = explanation(left, still.indices) or candidate
         off = still
         if moved is None:
             moved = what_moved(wider, off)
             # Small changes are told by the next fit, which has what this one lacks.
             moved = None if moved is None or moved[1].share < _LEAST_SHARE else moved
-            known_moved = known * found.left if found is not None else known
-    told = moved is not None and is_a_part(off)
-    steps = [] if told else measured_again(left, off, known * share, checked=checked)
-    now = known * off.left
+            known_moved = known * candidate.left if candidate is not None else known
+    is_moved = moved is not None and is_a_part(off)
+    steps = [] if is_moved else measured_again(left, off, known * share, checked=checked)
+    remaining = known * off.left
     if moved is not None:
         steps.append(about_change(*moved, known_moved * off.left))
-    if found is not None:
-        steps.append(other_model(left.fit, found, now))
-    return steps, now
+    if candidate is not None:
+        steps.append(other_model(left.fit, candidate, remaining))
+    return steps, remaining
 
 
 def _known(errors: Errors) -> float:
@@ -300,8 +300,8 @@ def _to_fix(notices: Sequence[Notice]) -> list[NextStep]:
     codes = list(dict.fromkeys(n.code for n in notices if n.level == "error" and n.code not in _OWN_STEP))
     if not codes:
         return []
-    what = "the error" if len(codes) == 1 else "the errors"
-    return [NextStep("fix-data", f"Fix first what {what} {listed(codes)} names: nothing else can be judged before.")]
+    subject = "the error" if len(codes) == 1 else "the errors"
+    return [NextStep("fix-data", f"Fix first what {subject} {listed(codes)} names: nothing else can be judged before.")]
 
 
 def _cures(notices: Sequence[Notice], steps: Sequence[NextStep]) -> list[NextStep]:
@@ -312,8 +312,8 @@ def _cures(notices: Sequence[Notice], steps: Sequence[NextStep]) -> list[NextSte
     codes = [code for code in codes if not (steps and code in _EXPLAINED)]
     if not codes:
         return []
-    what = "the warning" if len(codes) == 1 else "the warnings"
-    return [NextStep("see-warning", f"Do what {what} {listed(codes)} below {'says' if len(codes) == 1 else 'say'}.")]
+    subject = "the warning" if len(codes) == 1 else "the warnings"
+    return [NextStep("see-warning", f"Do what {subject} {listed(codes)} below {'says' if len(codes) == 1 else 'say'}.")]
 
 
 def _at_bound(case: Case, known: float) -> list[NextStep]:
@@ -337,13 +337,13 @@ def _more(case: Case, notices: Sequence[Notice], known: float) -> list[NextStep]
     if narrow and has_curves(case.left.fit) and joints_that_moved_little(case.left.fit, case.training):
         fit = replace(case.left.fit, joint_error=case.expected.joint_error)
         over = case.expected.overall.mean - expected_where_measured(fit, case.training)
-        where = _where(case, "know the whole workspace as well as where was measured")
-        return [NextStep("measure-more", f"{where} The gain is over the workspace.", max(over, 0.0))]
+        words = _where_to_measure(case, "know the whole workspace as well as where was measured")
+        return [NextStep("measure-more", f"{words} The gain is over the workspace.", max(over, 0.0))]
     gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else _LENGTH * (before - after)
     held_out = case.left.problem.data.configurations - n
     train = " Or train on more of them: `train`." if held_out >= n else ""
-    where = _where(case, f"halve what {n} leave uncertain, as {n} more would")
-    return [NextStep("measure-more", where + train, gain)]
+    words = _where_to_measure(case, f"halve what {n} leave uncertain, as {n} more would")
+    return [NextStep("measure-more", words + train, gain)]
 
 
 def _after(steps: Sequence[NextStep], more: list[NextStep]) -> list[NextStep]:
@@ -360,16 +360,16 @@ def _after(steps: Sequence[NextStep], more: list[NextStep]) -> list[NextStep]:
     ]
 
 
-def _where(case: Case, purpose: str) -> str:
+def _where_to_measure(case: Case, purpose: str) -> str:
     """Say where to measure more."""
     few = joints_that_moved_little(case.left.fit, case.training)
     if few:
-        where = f"in which these joints move further: {'; '.join(few[:_NAMED_NEXT_STEPS])}"
+        region = f"in which these joints move further: {'; '.join(few[:_NAMED_NEXT_STEPS])}"
     elif case.status is Status.RANK_LOSS or case.left.fit.gauge_freedoms:
-        where = "all over the workspace"
+        region = "all over the workspace"
     else:
-        where = f"also {least_known(case.left.fit)}"
-    return f"Measure more configurations to {purpose}: {where}."
+        region = f"also {least_known(case.left.fit)}"
+    return f"Measure more configurations to {purpose}: {region}."
 
 
 def _variances(case: Case) -> tuple[float, float]:
@@ -421,9 +421,9 @@ def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
     spread = math.sqrt(len(left.residual) / max(left.freedom, 1))
     size = spread * float(np.sqrt(np.mean((r[used] * metres[used]) ** 2))) if used.any() else 0.0
     noise = float(np.sqrt(np.mean(metres[used] ** 2))) if used.any() else 0.0
-    said = f"{size * 1e3:.2g} mm in each coordinate"
+    figure = f"{size * 1e3:.2g} mm in each coordinate"
     if fit.declared and size > _AT_THE_NOISE * noise:
-        first = f"What is left ({said}) is {size / noise:.2g} times the declared noise"
+        first = f"What is left ({figure}) is {size / noise:.2g} times the declared noise"
         return NextStep("unexplained", _unexplained(first, untold, "and check sigma."))
     if not fit.declared and fit.joint_error.any():
         vector = np.array([fit.robot.values[name] for name in fit.free.names])
@@ -432,7 +432,7 @@ def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
             return NextStep(
                 "unexplained",
                 _unexplained(
-                    f"What is left ({said}) is shared by the readings of a configuration",
+                    f"What is left ({figure}) is shared by the readings of a configuration",
                     untold,
                     "which is what is left if they scatter as much.",
                 ),
@@ -448,4 +448,4 @@ def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
         else ". There are too few readings to tell whether joint effects would explain more of it."
     )
     better = "" if fit.declared else " If the instrument is better than that, say so in a column sigma."
-    return NextStep("stop", f"Stop here: what is left ({said}) {known}{effects}{better}")
+    return NextStep("stop", f"Stop here: what is left ({figure}) {known}{effects}{better}")

@@ -60,25 +60,25 @@ def wrong_joint(left: LeftOver, index: int, shift: Array, scale: float) -> Wrong
     total = float(shift @ shift)
     trials = _Trials(left, index, shift)
     moved = trials.nearest()
-    rest, signs = trials.rest(moved), trials.rest(-2.0 * trials.noted)
+    residuals, signs = trials.residual_square(moved), trials.residual_square(-2.0 * trials.noted)
     usual = _AS_WELL * max(scale, 1e-300)
     noise = max(usual * len(shift), _EXPLAINED * total)
     by_chance = _BY_CHANCE * total
     best = int(np.argmin(signs))
     if signs[best] <= min(noise, by_chance) and _clearly(signs, best, usual, len(shift)):
         return WrongJoint(best + 1, 2.0 * float(trials.noted[best]), sign=True)
-    best = int(np.argmin(rest))
+    best = int(np.argmin(residuals))
     allowed = min(noise, by_chance) if len(shift) <= _FEW_NUMBERS else noise
-    if rest[best] > allowed or not _clearly(rest, best, usual, len(shift)):
+    if residuals[best] > allowed or not _clearly(residuals, best, usual, len(shift)):
         return None
     return WrongJoint(best + 1, -float(moved[best]), sign=False)
 
 
-def _clearly(rest: Array, best: int, usual: float, equations: int) -> bool:
+def _clearly(residuals: Array, best: int, usual: float, equations: int) -> bool:
     """Return whether the best explanation is so much likelier than each other one."""
-    others = np.delete(rest, best)
-    square = max(usual, float(rest[best]) / equations)
-    return not len(others) or float(others.min() - rest[best]) > _CLEARLY * square
+    others = np.delete(residuals, best)
+    square = max(usual, float(residuals[best]) / equations)
+    return not len(others) or float(others.min() - residuals[best]) > _CLEARLY * square
 
 
 class _Trials:
@@ -95,9 +95,9 @@ class _Trials:
         joints = self._one.joints
         self._as_noted = self._one.joints_are == "converted"
         self.noted = left.fit.robot.controller.from_model(joints)[0] if self._as_noted else joints[0]
-        self._given = self._equations(self.noted[None])[0]
+        self._as_given = self._equations(self.noted[None])[0]
 
-    def rest(self, moved: Array) -> Array:
+    def residual_square(self, moved: Array) -> Array:
         """Return the sum of squares that is left with each joint moved by so much, ``(joints,)``.
 
         Args:
@@ -116,22 +116,22 @@ class _Trials:
         if len(turning):
             r = self._left_by(np.repeat(turning, _TRIED), np.tile(around, len(turning)))
             moved[turning] = around[np.argmin(np.sum(r**2, axis=1).reshape(len(turning), _TRIED), axis=1)]
-        best, least = moved, self.rest(moved)
+        best, least = moved, self.residual_square(moved)
         for _ in range(_STEPS):
             r = self._left_by(np.tile(joints, 2), np.concatenate([moved, moved + _DIFFERENCE]))
-            here, slope = r[: len(joints)], (r[len(joints) :] - r[: len(joints)]) / _DIFFERENCE
+            value, slope = r[: len(joints)], (r[len(joints) :] - r[: len(joints)]) / _DIFFERENCE
             size = np.maximum(np.sum(slope**2, axis=1), 1e-300)
-            moved = moved - np.where(size > 1e-300, np.sum(slope * here, axis=1) / size, 0.0)
+            moved = moved - np.where(size > 1e-300, np.sum(slope * value, axis=1) / size, 0.0)
             moved = np.where(np.abs(moved - best) < 1.0, moved, best)
-            rest = self.rest(moved)
-            best, least = np.where(rest < least, moved, best), np.minimum(rest, least)
+            squares = self.residual_square(moved)
+            best, least = np.where(squares < least, moved, best), np.minimum(squares, least)
         return best
 
     def _left_by(self, joints: NDArray[np.intp], moved: Array) -> Array:
         """Return what is left with one joint elsewhere, trial by trial, ``(trials, equations)``."""
         noted = np.tile(self.noted, (len(moved), 1))
         noted[np.arange(len(moved)), joints] += moved
-        return np.asarray(self._shift + self._equations(noted) - self._given)
+        return np.asarray(self._shift + self._equations(noted) - self._as_given)
 
     def _equations(self, noted: Array) -> Array:
         """Return the equations of the configuration at other joint positions, ``(trials, equations)``."""
@@ -139,8 +139,8 @@ class _Trials:
         joints = self._left.fit.robot.controller.to_model(noted) if self._as_noted else noted
         data = self._one.of_configurations(np.zeros(len(noted), dtype=np.intp))
         problem = replace(problem, data=replace(data, joints=joints))
-        where = [np.repeat(data.configuration[b.readings], b.observation.components) for b in problem.blocks]
-        order = np.argsort(np.concatenate(where), kind="stable")
+        configurations = [np.repeat(data.configuration[b.readings], b.observation.components) for b in problem.blocks]
+        order = np.argsort(np.concatenate(configurations), kind="stable")
         return np.asarray(problem.residual(self._vector)[order].reshape(len(noted), -1))
 
 
@@ -211,12 +211,12 @@ def off_configurations(left: LeftOver) -> Off:
     shift, scale = np.zeros(0), 0.0
     while True:
         taken = _rows_of(rows, out)
-        now = rows.residual.copy()
+        residual = rows.residual.copy()
         if len(taken):
             shift = _shift(rows, taken)
-            now += rows.basis @ (rows.basis[taken].T @ shift)
-            now[taken] = 0.0
-        worst, scale = _worst(rows, now, out, taken)
+            residual += rows.basis @ (rows.basis[taken].T @ shift)
+            residual[taken] = 0.0
+        worst, scale = _worst(rows, residual, out, taken)
         if worst is None:
             break
         if len(out) == most:
@@ -224,15 +224,15 @@ def off_configurations(left: LeftOver) -> Off:
         out.append(worst)
     if not out:
         return Off()
-    first, found = 0, []
+    first, described = 0, []
     for index in out:
-        mine = rows.of[index]
-        size = mine.stop - mine.start
-        found.append(_described(left, rows, index, shift[first : first + size], scale))
+        span = rows.of[index]
+        size = span.stop - span.start
+        described.append(_described(left, rows, index, shift[first : first + size], scale))
         first += size
     before = _mean(rows, rows.residual, [])
-    worst_first = sorted(found, key=lambda off: -off.distance)
-    return Off(tuple(worst_first), _mean(rows, now, out) / before if before else 1.0, _in_a_row(left, out))
+    worst_first = sorted(described, key=lambda off: -off.distance)
+    return Off(tuple(worst_first), _mean(rows, residual, out) / before if before else 1.0, _in_a_row(left, out))
 
 
 def _in_a_row(left: LeftOver, out: list[int]) -> bool:
@@ -282,37 +282,37 @@ def _shift(rows: _Rows, taken: NDArray[np.intp]) -> Array:
     return np.asarray(np.linalg.lstsq(np.eye(len(taken)) - Q @ Q.T, rows.residual[taken], rcond=1e-8)[0])
 
 
-def _worst(rows: _Rows, now: Array, out: list[int], taken: NDArray[np.intp]) -> tuple[int | None, float]:
+def _worst(rows: _Rows, residual: Array, out: list[int], taken: NDArray[np.intp]) -> tuple[int | None, float]:
     """Return the configuration that is off most, None if none is, and the mean square of what the others leave.
 
     Args:
-        now: What the fit without `taken` leaves, ``(rows,)``.
+        residual: What the fit without `taken` leaves, ``(rows,)``.
     """
     edges = np.array([part.start for part in rows.of])
     count = np.array([part.stop - part.start for part in rows.of])
     read = np.flatnonzero(count)
     squares = np.zeros(len(rows.of))
-    squares[read] = np.add.reduceat(now**2, edges[read])
+    squares[read] = np.add.reduceat(residual**2, edges[read])
     squares[out] = 0.0
-    freedom = len(now) - len(taken) - rows.basis.shape[1]
+    freedom = len(residual) - len(taken) - rows.basis.shape[1]
     others = np.setdiff1d(read, out)
     if freedom < _LEAST_FREEDOM or len(others) < 2:
         return None, 0.0
     total = float(squares.sum())
-    spread = (len(now) - len(taken)) / freedom
+    spread = (len(residual) - len(taken)) / freedom
     usual = float(np.median(squares[others] / count[others])) * spread
-    kept = np.delete(rows.basis, taken, axis=0) if len(taken) else rows.basis
-    inside = np.linalg.inv(kept.T @ kept) if len(taken) and len(kept) > kept.shape[1] else None
+    remaining = np.delete(rows.basis, taken, axis=0) if len(taken) else rows.basis
+    inside = np.linalg.inv(remaining.T @ remaining) if len(taken) and len(remaining) > remaining.shape[1] else None
     best, ratio, left = None, 0.0, total / freedom
     for c in others[np.argsort(-squares[others] / count[others])][:_LOOKED_AT].tolist():
-        mine = rows.of[c]
-        Q = rows.basis[mine]
+        span = rows.of[c]
+        Q = rows.basis[span]
         hat = Q @ Q.T if inside is None else Q @ inside @ Q.T
         size = int(count[c])
-        explained = float(now[mine] @ np.linalg.lstsq(np.eye(size) - hat, now[mine], rcond=1e-8)[0])
-        rest = min(max(total - explained, 0.0) / max(freedom - size, 1), usual)
-        if explained / size > ratio * max(rest, 1e-300):
-            best, ratio = c, explained / size / max(rest, 1e-300)
+        explained = float(residual[span] @ np.linalg.lstsq(np.eye(size) - hat, residual[span], rcond=1e-8)[0])
+        unexplained = min(max(total - explained, 0.0) / max(freedom - size, 1), usual)
+        if explained / size > ratio * max(unexplained, 1e-300):
+            best, ratio = c, explained / size / max(unexplained, 1e-300)
     return (best if ratio > _LEAST_RATIO else None), left
 
 
@@ -323,15 +323,15 @@ def _described(left: LeftOver, rows: _Rows, index: int, shift: Array, scale: flo
         shift: What its rows are off by from a fit without it, ``(rows of it,)``.
         scale: Mean square of what the other configurations leave.
     """
-    mine = rows.of[index]
-    sigma, total = rows.sigma[mine], float(shift @ shift)
-    by_target = np.bincount(rows.target[mine], shift**2)
+    span = rows.of[index]
+    sigma, total = rows.sigma[span], float(shift @ shift)
+    by_target = np.bincount(rows.target[span], shift**2)
     several = np.count_nonzero(by_target) > 1
     alone = int(np.argmax(by_target)) if several and by_target.max() > _ONE_TARGET * total else None
     names = list(dict.fromkeys(block.target for block in left.problem.blocks))
-    counted = sigma > 0.0 if alone is None else (sigma > 0.0) & (rows.target[mine] == alone)
+    counted = sigma > 0.0 if alone is None else (sigma > 0.0) & (rows.target[span] == alone)
     lengths = (shift * sigma)[counted]
-    seen = max(len(np.unique(rows.target[mine][counted])), 1)
+    seen = max(len(np.unique(rows.target[span][counted])), 1)
     return OffConfiguration(
         index,
         wrong_joint(left, index, shift, scale) if alone is None else None,

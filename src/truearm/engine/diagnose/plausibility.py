@@ -18,7 +18,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.rigid_tool import OUTLIERS, TARGETS_SWAPPED, Suspect, places_of
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.entry_error_trials import ORIENTATION_ENTRY_ERRORS
+from truearm.engine.diagnose.entry_error_trials import ORIENTATION_ORDER
 from truearm.engine.diagnose.entry_errors import (
     FIXTURES_UNLIKELY,
     entry_errors_by_fit,
@@ -82,9 +82,9 @@ def exchanged_names(fit: Fit, data: Dataset) -> list[Suspect]:
     for (a, b), line in sorted(lines.items(), key=lambda item: -_length(item[1])):
         for c in _turned_round(line):
             if (c, a) not in suspects and (c, b) not in suspects:
-                for one, other in ((a, b), (b, a)):
+                for first, other in ((a, b), (b, a)):
                     word = f"is target {names[other]}"
-                    suspects[c, one] = Suspect(TARGETS_SWAPPED, data.labels[c], names[one], word)
+                    suspects[c, first] = Suspect(TARGETS_SWAPPED, data.labels[c], names[first], word)
     return [*suspects.values()]
 
 
@@ -103,9 +103,9 @@ def _turned_round(line: Array) -> list[int]:
     read = np.flatnonzero(np.isfinite(line).all(axis=1))
     if len(read) < _LEAST:
         return []
-    there, usual = line[read], _length(line)
-    along = there @ np.linalg.svd(there, full_matrices=False)[2][0]
-    length = np.linalg.norm(there, axis=1)
+    positions, usual = line[read], _length(line)
+    along = positions @ np.linalg.svd(positions, full_matrices=False)[2][0]
+    length = np.linalg.norm(positions, axis=1)
     alike = (np.abs(along) >= _PARALLEL * length) & (np.abs(length - usual) <= _SAME_LENGTH * usual)
     if alike.mean() < _ALIKE:
         return []
@@ -167,10 +167,10 @@ def check_rounding(fit: Fit, data: Dataset) -> list[Notice]:
     Args:
         fit: Of the data, or of a part of them.
     """
-    found = step_of(data)
-    if found is None or not data.has_position.any():
+    rounding = step_of(data)
+    if rounding is None or not data.has_position.any():
         return []
-    step, unit = found
+    step, unit = rounding
     by_rounding = (math.radians(step) if unit == "deg" else step) / math.sqrt(12.0)
     left = LeftOver.of(fit, data)
     seeming = joints_as_far_off(left)
@@ -238,9 +238,7 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
     if not data.has_position.any():
         return Comparison(notices)
     entries = entry_errors_in_positions(robot, data)
-    if entries and all(
-        entry.code in {rule.code for rule in ORIENTATION_ENTRY_ERRORS} for entry in entries
-    ):  # the positions are this robot's
+    if entries and all(entry.code == ORIENTATION_ORDER.code for entry in entries):  # the positions are this robot's
         return Comparison([*entries, *notices])
     if entries:
         return Comparison([*(other_robot(robot, data) or entries), *notices])
@@ -344,8 +342,8 @@ def _far_from_fixtures(fit: Fit, data: Dataset) -> tuple[list[Notice], list[Susp
     errors = errors_of(fit.robot, data)
     off = off_by(errors)
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed_off(off)).tolist()
-    where = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
-    suspects = [Suspect(OUTLIERS, *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, where, strict=True)]
+    places = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
+    suspects = [Suspect(OUTLIERS, *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, places, strict=True)]
     return _unlike_its_readings(fit, data), suspects
 
 
@@ -364,7 +362,7 @@ def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
         return []
     problem = Problem(fit.robot, data, FreeParameters(()), {observation.name: 1.0 for observation in OBSERVATIONS})
     residual, first = problem.residual(np.zeros(0)), 0
-    found = []
+    unlike = []
     for block in problem.blocks:
         rows = residual[first : first + block.rows].reshape(len(block.readings), -1)
         first += block.rows
@@ -373,29 +371,29 @@ def _unlike_its_readings(fit: Fit, data: Dataset) -> list[Notice]:
         for off, sigma in zip(np.linalg.norm(rows, axis=1).tolist(), block.sigma.tolist(), strict=True):
             if off > _FIXTURE_OUTLIER:
                 beside = "" if block.fixture is None else f" against {block.fixture}"
-                found.append(f"{block.target}{beside} by {off * sigma * 1e3:.3g} mm, {off:.0f} times its deviation")
-    if not found:
+                unlike.append(f"{block.target}{beside} by {off * sigma * 1e3:.3g} mm, {off:.0f} times its deviation")
+    if not unlike:
         return []
-    return [FIXTURE_MISPLACED(f"Fixtures are not where, or not as far apart, as the file says: {', '.join(found)}.")]
+    return [FIXTURE_MISPLACED(f"Fixtures are not where, or not as far apart, as the file says: {', '.join(unlike)}.")]
 
 
 def _one_point(fit: Fit, data: Dataset) -> list[Notice]:
     """Say if two targets with like names are the same point, each read where the other one is missing."""
-    robot, found = fit.robot, []
+    robot, pairs = fit.robot, []
     seen = {name: set(data.configuration[data.has_reading & (data.target == t)].tolist()) for t, name in _some(data)}
-    for (one, at), (other, there) in combinations(seen.items(), 2):
-        if not at or not there or at & there or not _like(one, other):
+    for (target, at), (other, other_at) in combinations(seen.items(), 2):
+        if not at or not other_at or at & other_at or not _like(target, other):
             continue
-        axes = [(robot.target(one).parameter(axis), robot.target(other).parameter(axis)) for axis in "xyz"]
+        axes = [(robot.target(target).parameter(axis), robot.target(other).parameter(axis)) for axis in "xyz"]
         apart = math.dist([robot.values[a] for a, _ in axes], [robot.values[b] for _, b in axes])
         deviation = math.hypot(*(robot.parameters[name].deviation or 0.0 for pair in axes for name in pair))
         if apart <= max(_SAME_TARGET, _SAME_DEVIATIONS * deviation):
-            found.append(f"{one} and {other} are {apart * 1e3:.2g} mm apart, and never read together")
-    if not found:
+            pairs.append(f"{target} and {other} are {apart * 1e3:.2g} mm apart, and never read together")
+    if not pairs:
         return []
     return [
         TARGET_MISSPELT(
-            f"Targets with like names are the same point on the flange: {'; '.join(found)}. If one name is misspelt, "
+            f"Targets with like names are the same point on the flange: {'; '.join(pairs)}. If one name is misspelt, "
             "correct it: a misspelt name is a target of its own."
         )
     ]
@@ -405,7 +403,7 @@ def _some(data: Dataset) -> list[tuple[int, str]]:
     return list(enumerate(data.targets))[:_MOST_TARGETS]
 
 
-def _like(one: str, other: str) -> bool:
+def _like(name: str, other: str) -> bool:
     """Return whether names differ by a data-entry error: not by a number, as those of a row of targets do."""
-    same_numbers = re.findall("[0-9]+", one) == re.findall("[0-9]+", other)
-    return same_numbers and SequenceMatcher(None, one.casefold(), other.casefold()).ratio() >= _LIKE
+    same_numbers = re.findall("[0-9]+", name) == re.findall("[0-9]+", other)
+    return same_numbers and SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= _LIKE

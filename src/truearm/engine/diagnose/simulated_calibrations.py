@@ -46,7 +46,7 @@ _MOST_LOST: Final = 0.02
 #: Informed share from which a parameter's intervals are compared, and how many times wider than linear is too wide,
 #: beyond what chance makes in so many trials (standard deviations).
 _INFORMED: Final = 0.5
-_BENT: Final = 1.2
+_WIDER: Final = 1.2
 _CHANCE: Final = 4.0
 #: Trials by which lengths of errors are averaged.
 _MOST_LENGTHS: Final = 1000
@@ -142,20 +142,20 @@ def simulated_calibrations(
         count = min(size, trials - first)
         centre = truth + problem.free.prior * drawn * rng.standard_normal((count, len(truth)))
         readings = at_truth + scatter(rng, count)
-        found, deviation, done = _calibrated(problem, whitening, readings, centre)
-        errors.append(found - truth)
+        estimate, deviation, has_settled = _calibrated(problem, whitening, readings, centre)
+        errors.append(estimate - truth)
         stated.append(np.tile(linear, (count, 1)) if fit.scattered else deviation)
-        settled.append(done)
+        settled.append(has_settled)
         progress(first + count)
-    kept = np.concatenate(settled)
-    error = np.concatenate(errors)[kept]
+    converged = np.concatenate(settled)
+    error = np.concatenate(errors)[converged]
     names = problem.free.names
     return SimulatedCalibrations(
         names=names,
         estimate=truth,
         linear_deviation=linear,
         error=error,
-        stated=np.concatenate(stated)[kept],
+        stated=np.concatenate(stated)[converged],
         asked=trials,
         seed=seed,
         held_out=_predicted(fit, judged.joints, names, error),
@@ -211,8 +211,8 @@ def _calibrated(
     ridge = np.eye(len(prior)) if problem.priors else np.zeros((len(prior),) * 2)
     x = centre.copy()
     for _ in range(_STEPS):
-        here = problem.at(x)
-        r, J = here.residual - readings, here.jacobian * prior
+        evaluation = problem.at(x)
+        r, J = evaluation.residual - readings, evaluation.jacobian * prior
         if whitening is not None:
             rows = np.concatenate([r[:, :, None], J], axis=2)
             whole = whitening.applied(np.moveaxis(rows, 1, 0).reshape(rows.shape[1], -1))
@@ -271,32 +271,32 @@ INTERVALS_TOO_NARROW: Final = Rule(
 )
 
 
-def check_linear(fit: Fit, found: SimulatedCalibrations) -> list[Notice]:
+def check_linear(fit: Fit, simulated: SimulatedCalibrations) -> list[Notice]:
     """Say where the linear intervals of a fit are not those of Monte Carlo, and if trials were lost."""
-    told = []
-    lost = found.asked - found.settled
-    if lost > _MOST_LOST * found.asked:
-        told.append(
+    notices = []
+    lost = simulated.asked - simulated.settled
+    if lost > _MOST_LOST * simulated.asked:
+        notices.append(
             TRIALS_LOST(
-                f"{lost} of {found.asked} simulated calibrations did not converge, and the intervals by Monte Carlo "
-                "are of the rest: the data hardly determine this model."
+                f"{lost} of {simulated.asked} simulated calibrations did not converge, and the intervals by Monte "
+                "Carlo are of the rest: the data hardly determine this model."
             )
         )
-    if found.settled < 2:
-        return told
+    if simulated.settled < 2:
+        return notices
     known = [
         i
-        for i, name in enumerate(found.names)
-        if (fit.robot.parameters[name].informed or 0.0) > _INFORMED and found.linear_deviation[i] > 0.0
+        for i, name in enumerate(simulated.names)
+        if (fit.robot.parameters[name].informed or 0.0) > _INFORMED and simulated.linear_deviation[i] > 0.0
     ]
-    ratio = {found.names[i]: float(found.deviation[i] / found.linear_deviation[i]) for i in known}
-    chance = _CHANCE / math.sqrt(2.0 * found.settled)
-    wider = sorted((name for name in ratio if ratio[name] > _BENT + chance), key=lambda name: -ratio[name])
+    ratio = {simulated.names[i]: float(simulated.deviation[i] / simulated.linear_deviation[i]) for i in known}
+    chance = _CHANCE / math.sqrt(2.0 * simulated.settled)
+    wider = sorted((name for name in ratio if ratio[name] > _WIDER + chance), key=lambda name: -ratio[name])
     if wider:
-        told.append(
+        notices.append(
             INTERVALS_TOO_NARROW(
                 f"By Monte Carlo the deviations of {listed(wider)} are up to {ratio[wider[0]]:.2g} times the linear "
                 "ones: the model bends too much for these."
             )
         )
-    return told
+    return notices

@@ -54,7 +54,7 @@ class LeftOver:
     basis: Array  #: Orthonormal directions of residuals that the free parameters can take, ``(rows, rank)``.
     strength: Array  #: Singular values of the Jacobian per prior, of those directions, ``(rank,)``.
     turns: Array  #: Directions of the parameters per prior that belong to them, ``(rank, parameters)``.
-    given: Dataset  #: The readings asked about.
+    asked: Dataset  #: The readings asked about.
     #: Which of their configurations these are: all, or of very many as many as the limit of derivatives has room for,
     #: evenly spaced.
     chosen: NDArray[np.intp]
@@ -69,8 +69,8 @@ class LeftOver:
         Q, R = np.linalg.qr(J * fit.free.prior)
         R = _without_size(R, Q.T @ r, float(r @ r)) if len(r) > len(fit.free.names) else R
         U, s, Vt = np.linalg.svd(R, full_matrices=False)
-        kept = s > 1e-8 * s[0]
-        return cls(fit, problem, r, J, Q @ U[:, kept], s[kept], Vt[kept], data, chosen)
+        significant = s > 1e-8 * s[0]
+        return cls(fit, problem, r, J, Q @ U[:, significant], s[significant], Vt[significant], data, chosen)
 
     def without(self, configurations: Sequence[int]) -> LeftOver:
         """Return what is left without some configurations; the parameters stay, and take what they can of the rest."""
@@ -78,14 +78,14 @@ class LeftOver:
             return self
         rows = ~np.isin(self.configuration, np.array(configurations, dtype=np.intp))
         data = self.problem.data
-        kept = np.setdiff1d(np.arange(data.configurations), np.array(configurations, dtype=np.intp))
+        remaining = np.setdiff1d(np.arange(data.configurations), np.array(configurations, dtype=np.intp))
         return replace(
             self,
-            problem=replace(self.problem, data=data.of_configurations(kept)),
+            problem=replace(self.problem, data=data.of_configurations(remaining)),
             residual=self.residual[rows],
             jacobian=self.jacobian[rows],
             basis=np.linalg.qr(self.basis[rows])[0],
-            chosen=self.chosen[kept],
+            chosen=self.chosen[remaining],
         )
 
     @property
@@ -110,11 +110,11 @@ class LeftOver:
 
 def _in_part(problem: Problem) -> tuple[Problem, NDArray[np.intp]]:
     """Return a problem with as many of its configurations as the limit of derivatives has room for, and which."""
-    n = room = problem.data.configurations
+    n = number = problem.data.configurations
     chosen, part, most = np.arange(n), problem, limit("derivatives")
-    while room > 1 and (count := part.rows * len(part.free.names)) > most:
-        room = max(1, min(room - 1, room * most // count))
-        chosen = np.linspace(0, n - 1, room).round().astype(np.intp)
+    while number > 1 and (count := part.rows * len(part.free.names)) > most:
+        number = max(1, min(number - 1, number * most // count))
+        chosen = np.linspace(0, n - 1, number).round().astype(np.intp)
         part = replace(problem, data=problem.data.of_configurations(chosen))
     return part, chosen
 
@@ -210,7 +210,7 @@ def with_causes(left: LeftOver, *causes: str) -> LeftOver:
 
 
 @dataclass(frozen=True, eq=False)
-class _Remainder:
+class _Residual:
     """What a fit leaves of some configurations."""
 
     problem: Problem  #: The readings, without any parameter.
@@ -235,23 +235,23 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
     freedom = _freedom(left, some)
     if not _is_enough(left, freedom):
         return None
-    rest = _remainder(left, some)
-    total = float(rest.residual @ rest.residual)
+    residual = _residual_of(left, some)
+    total = float(residual.residual @ residual.residual)
     if total <= 0.0:
         return None
-    found = []
+    causes = []
     for together in _at_once(groups):
         free = FreeParameters(tuple(p for cause in together for p in groups[cause]))
-        problem = replace(rest.problem, robot=robot, free=free)
-        if rest.problem.postures.loads is not None:  # effects that do nothing yet leave the loads as they are
-            problem.__dict__["postures"] = rest.problem.postures
+        problem = replace(residual.problem, robot=robot, free=free)
+        if residual.problem.postures.loads is not None:  # effects that do nothing yet leave the loads as they are
+            problem.__dict__["postures"] = residual.problem.postures
         J = problem.at(free.start).jacobian * free.prior
-        columns = rest.without_parameters(J)
+        columns = residual.without_parameters(J)
         places = {p.name: i for i, p in enumerate(free.parameters)}
         for cause in together:
-            found.append((cause, columns[:, [places[p.name] for p in groups[cause]]], 0.0))
-    found += _payload(left, rest)
-    judged = [e for e in (_judged(rest, *tried, freedom, len(found)) for tried in found) if e is not None]
+            causes.append((cause, columns[:, [places[p.name] for p in groups[cause]]], 0.0))
+    causes += _payload(left, residual)
+    judged = [e for e in (_judged(residual, *tried, freedom, len(causes)) for tried in causes) if e is not None]
     if not judged:
         return None
     best = min(judged, key=lambda e: e.left)
@@ -275,10 +275,10 @@ def _is_enough(left: LeftOver, freedom: int) -> bool:
 
 def _some(left: LeftOver, without: Sequence[int], groups: Mapping[str, tuple[Parameter, ...]]) -> NDArray[np.intp]:
     """Return the configurations looked at: no more than the derivatives by all that is tried have room for."""
-    kept = np.setdiff1d(np.unique(left.configuration), np.array(without, dtype=np.intp))
+    seen = np.setdiff1d(np.unique(left.configuration), np.array(without, dtype=np.intp))
     tried = max(1, sum(len(parameters) for parameters in groups.values()))
     most = min(_MOST, limit("derivatives") // (tried * int(np.bincount(left.configuration).max())))
-    return kept if len(kept) <= most else kept[np.linspace(0, len(kept) - 1, most).round().astype(np.intp)]
+    return seen if len(seen) <= most else seen[np.linspace(0, len(seen) - 1, most).round().astype(np.intp)]
 
 
 def _at_once(groups: Mapping[str, tuple[Parameter, ...]]) -> Iterator[list[str]]:
@@ -296,7 +296,7 @@ def _at_once(groups: Mapping[str, tuple[Parameter, ...]]) -> Iterator[list[str]]
         yield part
 
 
-def _remainder(left: LeftOver, some: NDArray[np.intp]) -> _Remainder:
+def _residual_of(left: LeftOver, some: NDArray[np.intp]) -> _Residual:
     """Return what a fit leaves of some configurations."""
     data = left.problem.data
     rows = np.isin(left.configuration, some)
@@ -308,7 +308,7 @@ def _remainder(left: LeftOver, some: NDArray[np.intp]) -> _Remainder:
         Q, r = np.linalg.qr(Q[rows])[0], r[rows]
     place = np.searchsorted(some, left.configuration[rows])
     order = np.random.default_rng(0).permutation(len(some))
-    return _Remainder(problem, r - Q @ (Q.T @ r), Q, (order % _FOLDS)[place], place)
+    return _Residual(problem, r - Q @ (Q.T @ r), Q, (order % _FOLDS)[place], place)
 
 
 def _candidates(
@@ -344,21 +344,23 @@ def _candidates(
     return robot, {cause: parameters for cause, parameters in groups.items() if parameters}
 
 
-def _judged(rest: _Remainder, cause: str, columns: Array, mass: float, freedom: int, tried: int) -> Explanation | None:
+def _judged(
+    residual: _Residual, cause: str, columns: Array, mass: float, freedom: int, tried: int
+) -> Explanation | None:
     """Return what columns explain of the residuals, None if it is too little or chance.
 
     Args:
         columns: Per prior and without what the free parameters can take, ``(rows, k)``.
         mass: Of a payload [kg].
     """
-    r, (rows, k) = rest.residual, columns.shape
+    r, (rows, k) = residual.residual, columns.shape
     # The smaller of two systems: (A'A + c)^-1 A' = A' (AA' + c)^-1. Their eigenvalues differ by zeros alone.
     products = columns.T @ columns if k <= rows else columns @ columns.T
     ridge = 1.0 + 1e-9 * np.trace(products)
     system = products + ridge * np.eye(len(products))
     # What a fold is off by, estimated from the others, follows from one solution for all (Allen 1974, "The relationship
     # between variable selection and data augmentation and a method for prediction"): no system for each fold.
-    parts = [np.flatnonzero(rest.fold == fold) for fold in range(_FOLDS)]
+    parts = [np.flatnonzero(residual.fold == fold) for fold in range(_FOLDS)]
     if k <= rows:
         spread = np.linalg.solve(system, columns.T)
         left = r - columns @ (spread @ r)
@@ -385,40 +387,40 @@ def _judged(rest: _Remainder, cause: str, columns: Array, mass: float, freedom: 
     return Explanation(cause, remaining, chance, mass) if chance < _LARGEST_CHANCE else None
 
 
-def _payload(left: LeftOver, rest: _Remainder) -> Iterator[tuple[str, Array, float]]:
+def _payload(left: LeftOver, residual: _Residual) -> Iterator[tuple[str, Array, float]]:
     """Try another payload, where compliances are free and links weigh something, as these tell them apart."""
     fit = left.fit
     robot, free = fit.robot, fit.free
     springs = [f"compliance_{i + 1}" for i in range(len(robot.joints))]
     if not all(name in robot.parameters for name in springs) or not any(link.mass for link in robot.masses):
         return
-    mine = [i for i, name in enumerate(springs) if name in free.names]
-    if not mine:
+    free_springs = [i for i, name in enumerate(springs) if name in free.names]
+    if not free_springs:
         return
     fixed = [k for k, name in enumerate(free.names) if name not in springs]
-    rows = np.isin(left.configuration, _places(left, rest))
+    rows = np.isin(left.configuration, _places(left, residual))
     Q = np.linalg.qr((left.jacobian[:, fixed] * free.prior[fixed])[rows])[0]
-    here = rest.problem.at(np.zeros(0))
-    variables = robot.variables(rest.problem.postures, robot.values)
+    evaluation = residual.problem.at(np.zeros(0))
+    variables = robot.variables(residual.problem.postures, robot.values)
     bodies = [Payload(1.0), *(Payload(1.0, _unit(k)) for k in range(3))]
     unit = np.array([_turning(robot, replace(robot, masses=(), payload=body), variables) for body in bodies])
     unit[1:] -= unit[0]  # of the moment alone
-    of_rows, by = rest.configuration, here.by_joints
-    now = rest.problem.postures.joint_loads
-    lever = np.array([now[i, 5 if robot.joints[i].kind == "revolute" else 2] for i in range(len(robot.joints))])
+    of_rows, by = residual.configuration, evaluation.by_joints
+    loads = residual.problem.postures.joint_loads
+    lever = np.array([loads[i, 5 if robot.joints[i].kind == "revolute" else 2] for i in range(len(robot.joints))])
     own = by * lever[:, of_rows].T  # (rows, joints)
     added = by[:, :, None] * np.moveaxis(unit[:, :, of_rows], (0, 1, 2), (2, 1, 0))  # (rows, joints, 4)
     count = len(robot.joints)
-    columns = np.concatenate([own[:, mine], added.reshape(len(by), 4 * count)], axis=1)
+    columns = np.concatenate([own[:, free_springs], added.reshape(len(by), 4 * count)], axis=1)
     r = left.residual[rows]
     columns -= Q @ (Q.T @ columns)
     r = r - Q @ (Q.T @ r)
     start = np.array([robot.values[name] for name in springs])
     prior = np.array([robot.parameters[name].prior for name in springs])
-    found = _bilinear(columns.T @ columns, columns.T @ r, mine, start, prior)
-    if found is None:
+    solution = _bilinear(columns.T @ columns, columns.T @ r, free_springs, start, prior)
+    if solution is None:
         return
-    compliance, load = found
+    compliance, load = solution
     mass = robot.payload.mass + float(load[0])
     # The moment is that of what is added to the payload.
     moment = robot.payload.mass * np.array(robot.payload.cog) + load[1:]
@@ -428,12 +430,12 @@ def _payload(left: LeftOver, rest: _Remainder) -> Iterator[tuple[str, Array, flo
         mass = 0.0
     scale = np.array([_MASS_PRIOR, *[_MOMENT_PRIOR] * 3])
     together = np.einsum("rja,j->ra", added, compliance) * scale
-    yield PAYLOAD, rest.without_parameters(together), mass
+    yield PAYLOAD, residual.without_parameters(together), mass
 
 
-def _places(left: LeftOver, rest: _Remainder) -> NDArray[np.intp]:
+def _places(left: LeftOver, residual: _Residual) -> NDArray[np.intp]:
     """Return the configurations of the dataset that a remainder is of."""
-    labels = rest.problem.data.labels
+    labels = residual.problem.data.labels
     known = {label: i for i, label in enumerate(left.problem.data.labels)}
     return np.array([known[label] for label in labels], dtype=np.intp)
 
@@ -448,7 +450,7 @@ def _turning(robot: Robot, loaded: Robot, variables: Array) -> Array:
     return np.array([loads[i, 5 if joint.kind == "revolute" else 2] for i, joint in enumerate(robot.joints)])
 
 
-def _bilinear(G: Array, g: Array, mine: list[int], start: Array, prior: Array) -> tuple[Array, Array] | None:
+def _bilinear(G: Array, g: Array, free_springs: list[int], start: Array, prior: Array) -> tuple[Array, Array] | None:
     """Return compliances ``(joints,)`` and what to add to a payload: mass and moment ``(4,)``; None if nothing fits.
 
     The residual is ``r + sum_i own_i (c_i - start_i) + sum_i c_i added_i p``, and its sums of products are given.
@@ -456,44 +458,44 @@ def _bilinear(G: Array, g: Array, mine: list[int], start: Array, prior: Array) -
     Args:
         G, g: Columns times columns, and times the residual; own columns of the free joints first, then four of each
             joint.
-        mine: The joints whose compliance is free.
+        free_springs: The joints whose compliance is free.
     """
-    count, k = len(start), len(mine)
+    count, k = len(start), len(free_springs)
     c, p = start.copy(), np.zeros(4)
     scale = np.array([_MASS_PRIOR, *[_MOMENT_PRIOR] * 3])
 
     def weights(c: Array, p: Array) -> Array:
-        return np.concatenate([(c - start)[mine], np.outer(c, p).reshape(-1)])
+        return np.concatenate([(c - start)[free_springs], np.outer(c, p).reshape(-1)])
 
     def cost(c: Array, p: Array) -> float:
         w = weights(c, p)
-        springs = ((c / prior)[mine] ** 2).sum()
+        springs = ((c / prior)[free_springs] ** 2).sum()
         return float(w @ G @ w + 2.0 * w @ g + springs + ((p / scale) ** 2).sum())
 
-    now = cost(c, p)
+    current = cost(c, p)
     for _ in range(_STEPS):
         D = np.zeros((k + 4 * count, k + 4))
         D[:k, :k] = np.eye(k)
-        for place, i in enumerate(mine):
+        for place, i in enumerate(free_springs):
             D[k + 4 * i : k + 4 * i + 4, place] = p
         for i in range(count):
             D[k + 4 * i : k + 4 * i + 4, k:] = c[i] * np.eye(4)
         w = weights(c, p)
-        weight = np.concatenate([1.0 / prior[mine] ** 2, 1.0 / scale**2])
-        slope = D.T @ (G @ w + g) + weight * np.concatenate([c[mine], p])
-        size = np.concatenate([prior[mine], scale])
+        weight = np.concatenate([1.0 / prior[free_springs] ** 2, 1.0 / scale**2])
+        slope = D.T @ (G @ w + g) + weight * np.concatenate([c[free_springs], p])
+        size = np.concatenate([prior[free_springs], scale])
         H = (D.T @ G @ D + np.diag(weight)) * np.outer(size, size)
         step = -size * np.linalg.solve(H, slope * size)
         for shorter in (1.0, 0.5, 0.25, 0.1, 0.01):
             c_next, p_next = c.copy(), p + shorter * step[k:]
-            c_next[mine] += shorter * step[:k]
-            there = cost(c_next, p_next)
-            if there < now:
+            c_next[free_springs] += shorter * step[:k]
+            next_cost = cost(c_next, p_next)
+            if next_cost < current:
                 break
         else:
             break
-        smaller = now - there
-        c, p, now = c_next, p_next, there
-        if smaller < _FINAL_STEP * max(now, 1.0):
+        smaller = current - next_cost
+        c, p, current = c_next, p_next, next_cost
+        if smaller < _FINAL_STEP * max(current, 1.0):
             break
     return (c, p) if np.isfinite(p).all() and p.any() else None

@@ -48,17 +48,17 @@ class VisitLikelihood:
         names, factor = factors_of(problem)
         of_reading = _readings(left)
         visits = of_reading if each_reading else problem.visits
-        kept = _no_outliers(left.residual, of_reading) & _some(left)
+        used = _no_outliers(left.residual, of_reading) & _some(left)
         return cls(
             left,
             Linearised(
-                residual=left.residual[kept],
-                by_parameters=left.jacobian[kept] * free.prior,
-                by_joints=problem.at(values).by_joints[kept],
+                residual=left.residual[used],
+                by_parameters=left.jacobian[used] * free.prior,
+                by_joints=problem.at(values).by_joints[used],
                 offset=(values - free.nominal) / free.prior,
                 priors=True,
-                visits=Visits(np.unique(visits[kept], return_inverse=True)[1].reshape(-1)),
-                factor=factor[kept],
+                visits=Visits(np.unique(visits[used], return_inverse=True)[1].reshape(-1)),
+                factor=factor[used],
             ),
             tuple(names),
         )
@@ -153,7 +153,7 @@ _LARGEST_CHANCE: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class ArrivalLag:
+class ApproachLag:
     """What the approach direction explains."""
 
     share: float  #: Part of the residual's root mean square that it explains, corrected for the number of joints.
@@ -168,21 +168,21 @@ class ArrivalLag:
         """Whether it explains at least 5 %, more than chance, with one sign on most joints."""
         positive = int((self.lags > 0).sum())
         same = max(positive, len(self.lags) - positive)
-        told = self.share >= _LEAST_EXPLAINED and self.chance < _LARGEST_CHANCE
-        return told and same > _LEAST_OF_ONE_SIGN * len(self.lags)
+        is_large = self.share >= _LEAST_EXPLAINED and self.chance < _LARGEST_CHANCE
+        return is_large and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
 
-def approach_lag(left_over: LeftOver) -> ArrivalLag | None:
+def approach_lag(left_over: LeftOver) -> ApproachLag | None:
     """Return what approach directions explain of the residuals of a fit.
 
     None where too few readings are left, or where the order of measurement is not known.
     """
     data, problem = left_over.problem.data, left_over.problem
-    given = left_over.given
-    if data.number is None or given.number is None:
+    asked = left_over.asked
+    if data.number is None or asked.number is None:
         return None
-    here = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
-    H = here.by_joints * _last_moves(given, given.number)[left_over.chosen][left_over.configuration]
+    evaluation = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
+    H = evaluation.by_joints * _last_moves(asked, asked.number)[left_over.chosen][left_over.configuration]
     free = left_over.freedom
     if free < 4 * H.shape[1]:
         return None
@@ -193,7 +193,7 @@ def approach_lag(left_over: LeftOver) -> ArrivalLag | None:
     share = 1.0 - after * (free - H.shape[1]) / (before * free) if before > 0 else 0.0
     effective = max(3 * data.configurations - left_over.basis.shape[1], 0)
     chance = chi_squared_tail(effective * share, H.shape[1])
-    return ArrivalLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, chance, -lags)
+    return ApproachLag(1.0 - float(np.sqrt(after / before)) if before > 0 else 0.0, chance, -lags)
 
 
 def _last_moves(data: Dataset, number: Array) -> Array:
@@ -215,17 +215,19 @@ JOINTS_NOT_SETTLED: Final = Rule(
 
 def check_approach_lag(left_over: LeftOver) -> list[Notice]:
     """Return a notice if the joints were not at rest."""
-    found = approach_lag(left_over)
-    if found is None or not found.fires:
+    approach = approach_lag(left_over)
+    if approach is None or not approach.fires:
         return []
     units = ["deg" if kind == "revolute" else "mm" for kind in left_over.problem.data.joint_kinds]
-    shown = ", ".join(f"{from_si(lag, unit):+.3f} {unit}" for lag, unit in zip(found.lags.tolist(), units, strict=True))
+    shown = ", ".join(
+        f"{from_si(lag, unit):+.3f} {unit}" for lag, unit in zip(approach.lags.tolist(), units, strict=True)
+    )
     return [
         JOINTS_NOT_SETTLED(
-            f"The direction from which each joint arrived explains {found.share:.0%} of the residuals. The true joint "
-            f"positions differ from the recorded ones by {shown}, times the sign of the last move. Either the joints "
-            "were read before the robot had settled: use the commanded joints, or read later. Or the joints have "
-            "hysteresis: arrive from one side only."
+            f"The direction from which each joint arrived explains {approach.share:.0%} of the residuals. The true "
+            f"joint positions differ from the recorded ones by {shown}, times the sign of the last move. Either the "
+            "joints were read before the robot had settled: use the commanded joints, or read later. Or the joints "
+            "have hysteresis: arrive from one side only."
         )
     ]
 
@@ -295,7 +297,7 @@ _LEAST_GAIN_SIGMA: Final = 10.83
 #: Errors of the joints must move readings by this part of the declared deviations, or the first judgement holds.
 _LEAST_MOVED: Final = 0.1
 #: One target hardly tells noise from errors of the joints: beyond so many times no number is given.
-_MOST_TOLD: Final = 10.0
+_LARGEST_STATED: Final = 10.0
 _SMALLEST_RATIO: Final = 1e-7
 
 
@@ -326,33 +328,33 @@ def check_sigma(left: LeftOver) -> list[Notice]:
     along = left.basis.T @ left.residual
     beyond = max(float(left.residual @ left.residual - along @ along), 0.0)
 
-    def ratio(told: float) -> tuple[float, float]:
+    def ratio(assumed: float) -> tuple[float, float]:
         """Return residuals over declared deviations, and degrees of freedom, of a fit told so small a part of these."""
-        pull = 1.0 / told**2
+        pull = 1.0 / assumed**2
         step = -(pull * left.strength * along + prior) / (pull * left.strength**2 + 1.0)
         squares = beyond + float(np.sum((left.strength * step + along) ** 2))
         freedom = len(left.residual) - float(np.sum(pull * left.strength**2 / (pull * left.strength**2 + 1.0)))
         return float(np.sqrt(squares / max(freedom, 1.0))), freedom
 
-    found, freedom = ratio(1.0)
+    estimate, freedom = ratio(1.0)
     declared = float(np.sqrt(left.residual @ left.residual / max(freedom, 1.0)))
     for _ in range(_ROUNDS):
-        before = found
-        found, freedom = ratio(max(min(found, 1.0), _SMALLEST_RATIO))
-        if abs(found - before) < 1e-3 * before:
+        before = estimate
+        estimate, freedom = ratio(max(min(estimate, 1.0), _SMALLEST_RATIO))
+        if abs(estimate - before) < 1e-3 * before:
             break
     k = 2.0 / (9.0 * max(freedom, 1.0))
     chance = max(1.0 - k - _QUANTILE * np.sqrt(k), 0.0) ** 1.5
-    if freedom < _LEAST_FREEDOM or found >= _LARGEST_RATIO * chance:
+    if freedom < _LEAST_FREEDOM or estimate >= _LARGEST_RATIO * chance:
         return []
-    times = 1.0 / max(found, _SMALLEST_RATIO)
+    times = 1.0 / max(estimate, _SMALLEST_RATIO)
     size = _size(left)
     words = f"The declared deviations{size} are about {_rounded(times)} times larger than what the readings scatter by"
-    if declared > _PRIORS_WIN * found:
+    if declared > _PRIORS_WIN * estimate:
         return [
             SIGMA_TOO_LARGE(
                 f"{words}. So the priors hold the robot near its nominal values, and it is "
-                f"{_rounded(declared / found)} times farther from the readings than it need be. Fix sigma or its "
+                f"{_rounded(declared / estimate)} times farther from the readings than it need be. Fix sigma or its "
                 "unit, or leave it out: the noise is then estimated.",
                 "error",
             )
@@ -373,15 +375,15 @@ def check_sigma_beside_joints(left: LeftOver) -> list[Notice]:
         return []
     readings = VisitLikelihood.of(left)
     free, gained = readings.largest()
-    kept, before = readings.largest((DECLARED,))
+    largest, before = readings.largest((DECLARED,))
     share = float(np.sqrt(free.factors[readings.factors.index(DECLARED)]))
     if 2.0 * (gained - before) < _LEAST_GAIN_SIGMA or share > _LARGEST_SHARE:
         return []
     if readings.share_of_joints(free) * share**2 < _LEAST_MOVED:
         return []
-    smaller = min(float(np.sqrt(kept.joints.sum() / free.joints.sum())), 1.0)
+    smaller = min(float(np.sqrt(largest.joints.sum() / free.joints.sum())), 1.0)
     part = f"{_rounded(100.0 * smaller)} %" if smaller > 0.0 else "none"
-    times = f"about {_rounded(1.0 / share)}" if share > 1.0 / _MOST_TOLD else f"more than {_MOST_TOLD:g}"
+    times = f"about {_rounded(1.0 / share)}" if share > 1.0 / _LARGEST_STATED else f"more than {_LARGEST_STATED:g}"
     return [
         SIGMA_TOO_LARGE(
             f"The declared deviations{_size(left)} are {times} times larger than the noise that the readings show "

@@ -54,7 +54,6 @@ CAUSES: Final = (
     "joint-sign",
     "rows-shifted",
     "rows-unrelated",
-    "quaternion-order",
     "orientation-order",
     "fixtures-unlikely",
     "wrong-robot",
@@ -277,13 +276,13 @@ class Lengths:
         share = np.sqrt(np.diag(together))
         own = together / np.where(share > 0.0, share, 1.0)
         along = np.where(share**2 >= _LEAST_SHARE, self.moved @ self.directions @ own, 0.0)
-        told: list[int] = []
+        named: list[int] = []
         for i in np.argsort(-np.abs(along), kind="stable").tolist():
-            if told and (abs(along[i]) < _NAMED or len(told) == _MOST_NAMED):
+            if named and (abs(along[i]) < _NAMED or len(named) == _MOST_NAMED):
                 break
-            if all(abs(own[:, i] @ own[:, k]) < _SAME for k in told):
-                told.append(i)
-        return [self._in_words(own[:, i], float(along[i])) for i in told]
+            if all(abs(own[:, i] @ own[:, k]) < _SAME for k in named):
+                named.append(i)
+        return [self._in_words(own[:, i], float(along[i])) for i in named]
 
     def _in_words(self, direction: Array, along: float) -> str:
         """Name a combination of unit length in priors and how far it moved, counted in its largest member."""
@@ -381,7 +380,7 @@ class _Better:
 
     name: str
     left: float
-    given: float
+    own_error: float
 
     @classmethod
     def of(cls, robot: Robot, data: Dataset) -> _Better | None:
@@ -389,27 +388,27 @@ class _Better:
         few = data
         if data.configurations > _COMPARED:
             few = data.of_configurations(np.linspace(0, data.configurations - 1, _COMPARED).astype(np.intp))
-        given = _uncalibrated_error(replace(robot, known={}, effect_names=(), proof=None), few)
+        own_error = _uncalibrated_error(replace(robot, known={}, effect_names=(), proof=None), few)
         kinds = [joint.kind for joint in robot.joints]
         robots = {name: load_robot(name) for name in library()}
-        alike = {name: one for name, one in robots.items() if [joint.kind for joint in one.joints] == kinds}
+        alike = {name: other for name, other in robots.items() if [joint.kind for joint in other.joints] == kinds}
         if not few.anchored:
             alike = _nearest(robot, alike, few.joints)
         elif few.fixture is None:
             alike = _best_placed(alike, few)
-        found = {name: _uncalibrated_error(one, few) for name, one in alike.items()}
-        best = min(found, key=lambda name: found[name], default=None)
-        if best is None or not found[best] * _SEVERAL_TIMES <= given < math.inf:
+        errors = {name: _uncalibrated_error(other, few) for name, other in alike.items()}
+        best = min(errors, key=lambda name: errors[name], default=None)
+        if best is None or not errors[best] * _SEVERAL_TIMES <= own_error < math.inf:
             return None
         reach = float(np.linalg.norm(alike[best].forward(few.joints)[0], axis=1).max())
-        return cls(best, found[best], given) if found[best] <= LARGEST_SHARE_LEFT * reach else None
+        return cls(best, errors[best], own_error) if errors[best] <= LARGEST_SHARE_LEFT * reach else None
 
     @property
     def text(self) -> str:
         """Say it, as a sentence that goes on."""
         return (
-            f" {self.name} of the library fits them {self.given / self.left:.2g} times better without calibration: "
-            f"{self.left * 1e3:.3g} mm beside {self.given * 1e3:.3g} mm (root mean square)."
+            f" {self.name} of the library fits them {self.own_error / self.left:.2g} times better without calibration: "
+            f"{self.left * 1e3:.3g} mm beside {self.own_error * 1e3:.3g} mm (root mean square)."
         )
 
 

@@ -26,7 +26,7 @@ class Words:
 
     text: str
     quiet: bool = False  #: Whether it stands back.
-    held: Mapping[str, Any] = field(default_factory=dict)  #: What JSON holds of it.
+    in_json: Mapping[str, Any] = field(default_factory=dict)  #: What JSON holds of it.
     is_detail: bool = False  #: Whether it is not on the first screen.
     kind: ClassVar = "words"
 
@@ -64,7 +64,7 @@ class Table:
     look: str = ""  #: ``sortable`` and classes of the style sheet.
     wide: bool = False  #: Whether it may be wider than the page.
     marks: tuple[str, ...] = ()  #: Of each row: ``uninformed``, ``taken``, or nothing.
-    held: Mapping[str, Any] = field(default_factory=dict)  #: What JSON holds of it.
+    in_json: Mapping[str, Any] = field(default_factory=dict)  #: What JSON holds of it.
     is_detail: bool = False  #: Whether it is not on the first screen.
     kind: ClassVar = "table"
 
@@ -220,14 +220,14 @@ class Document:
         return page(_TEMPLATE, pictures_of(self), of, document=self)
 
 
-def say(*lines: str, **held: Any) -> Words:
+def say(*lines: str, **in_json: Any) -> Words:
     """Return lines of text, with what JSON holds of them by its keys; either may be missing, and lines may be empty."""
-    return Words("\n".join(filter(None, lines)), held=held)
+    return Words("\n".join(filter(None, lines)), in_json=in_json)
 
 
-def detail(*lines: str, **held: Any) -> Words:
+def detail(*lines: str, **in_json: Any) -> Words:
     """Return lines that are not on the first screen; arguments as for :func:`say`."""
-    return Words("\n".join(filter(None, lines)), held=held, is_detail=True)
+    return Words("\n".join(filter(None, lines)), in_json=in_json, is_detail=True)
 
 
 def under(key: str, blocks: Iterable[Block]) -> Under:
@@ -257,17 +257,17 @@ def lines_of(blocks: Iterable[Block], *, details: bool = True) -> list[str]:
     return [line for leaf in leaves_of(blocks) if details or not leaf.is_detail for line in leaf.lines]
 
 
-def held_by(blocks: Iterable[Block]) -> dict[str, Any]:
+def json_of(blocks: Iterable[Block]) -> dict[str, Any]:
     """Return what JSON holds of blocks."""
-    held: dict[str, Any] = {}
+    summary: dict[str, Any] = {}
     for block in blocks:
         if isinstance(block, Words | Table):
-            held |= block.held
+            summary |= block.in_json
         elif isinstance(block, Under):
-            held[block.key] = held_by(block.blocks)
+            summary[block.key] = json_of(block.blocks)
         elif isinstance(block, Each):
-            held[block.key] = [held_by(entry) for entry in block.entries]
-    return held
+            summary[block.key] = [json_of(entry) for entry in block.entries]
+    return summary
 
 
 def _pictures(blocks: Sequence[Block]) -> Iterator[Picture]:

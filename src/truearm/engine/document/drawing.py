@@ -69,8 +69,8 @@ def rounded(values: Array, digits: int) -> list[float]:
 
 def rounded_to(values: Array, decimals: int) -> list[Any]:
     """Return a list, or a list of lists, of numbers with so many decimals."""
-    made: list[Any] = (np.round(np.asarray(values, float), decimals) + 0.0).tolist()
-    return made
+    numbers: list[Any] = (np.round(np.asarray(values, float), decimals) + 0.0).tolist()
+    return numbers
 
 
 Figure = dict[str, Any]
@@ -132,7 +132,7 @@ def logarithmic_axis(title: str, low: float, high: float) -> Figure:
     ticks = [float(f"{step}e{decade}") for decade in decades for step in steps]
     if low < high and sum(low <= tick <= high for tick in ticks) < 2:
         decade = math.floor(math.log10(third := (high - low) / 3.0))
-        step = max(one for one in (1, 2, 5) if one * 10.0**decade <= third)
+        step = max(factor for factor in (1, 2, 5) if factor * 10.0**decade <= third)
         first, last = (int(end / (step * 10.0**decade)) for end in (low, high))
         ticks = [float(f"{k * step}e{decade}") for k in range(max(first, 1), last + 2)]
     return axis(f"{title}, logarithmic") | {

@@ -40,12 +40,12 @@ _CELLS: Final = 30
 _LOGARITHMIC: Final = 12.0
 
 
-def histogram(before: Array, after: Array, unit: str, what: str, of: str = "readings") -> Figure:
+def histogram(before: Array, after: Array, unit: str, quantity: str, of: str = "readings") -> Figure:
     """Show how errors are spread before and after, in the same bins.
 
     Args:
         before, after: Error norms in `unit`.
-        what: The quantity, for the axis: ``position error``.
+        quantity: The quantity, for the axis: ``position error``.
         of: What is counted.
     """
     both = np.concatenate([before, after])
@@ -71,9 +71,9 @@ def histogram(before: Array, after: Array, unit: str, what: str, of: str = "read
         }
         for name, errors, colour in (("before", before, BEFORE), ("after", after, AFTER))
     ]
-    x = axis(f"{what} [{unit}]")
+    x = axis(f"{quantity} [{unit}]")
     if logarithmic:
-        x = logarithmic_axis(f"{what} [{unit}]", float(edges[0]), float(edges[-1]))
+        x = logarithmic_axis(f"{quantity} [{unit}]", float(edges[0]), float(edges[-1]))
     return figure(traces, 330, xaxis=x, yaxis=axis(of), barmode="overlay", bargap=0)
 
 
@@ -85,13 +85,13 @@ def workspace(part: Dataset, tips: Array, before: Array, after: Array) -> Figure
         tips: Where the target of each is, in the robot's base frame [m], ``(readings, 3)``.
         before, after: Error of each reading [mm], NaN where none was read.
     """
-    kept = np.isfinite(before) & np.isfinite(after)
-    before, after = before[kept], after[kept]
-    points = tips[kept] * 1e3
+    finite = np.isfinite(before) & np.isfinite(after)
+    before, after = before[finite], after[finite]
+    points = tips[finite] * 1e3
     names = [
         [html.escape(part.labels[c]), html.escape(part.targets[t]), b, a]
         for c, t, b, a in zip(
-            part.configuration[kept], part.target[kept], rounded(before, 3), rounded(after, 3), strict=True
+            part.configuration[finite], part.target[finite], rounded(before, 3), rounded(after, 3), strict=True
         )
     ]
     high_before, high_after = _colour_end(before), _colour_end(after)

@@ -23,7 +23,7 @@ from truearm.engine.base.errors import (
     shortened,
     with_short_words,
 )
-from truearm.engine.base.units import parts_of, said_of
+from truearm.engine.base.units import mark_lines, parts_of
 from truearm.engine.base.version import __version__
 from truearm.engine.document.drawing import AFTER, BEFORE, DARK, Figure
 
@@ -44,7 +44,7 @@ def page(template: Path, figures: Mapping[str, Figure], of: object, **content: A
     """
     return _template(template).render(
         **content,
-        mark=said_of(parts_of([of])),
+        mark=mark_lines(parts_of([of])),
         drawn=set(figures),
         heights={name: figure["layout"]["height"] for name, figure in figures.items()},
         figures=Markup(json_for_script(figures)),
@@ -97,7 +97,7 @@ def with_code(text: str) -> Markup:
 def json_for_script(value: object) -> str:
     """Return JSON that can stand inside a script element whatever its texts hold."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    text = _LONG_WORD.sub(lambda found: shortened(found[0], LONGEST_WORD), text)
+    text = _LONG_WORD.sub(lambda match: shortened(match[0], LONGEST_WORD), text)
     return text.translate(_UNSAFE | {ord(c): f"\\\\u{ord(c):04x}" for c in TURNING})
 
 

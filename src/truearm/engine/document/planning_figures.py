@@ -97,7 +97,7 @@ def pose_cube(plan: PosePlan, paths: Mapping[str, Array] | None = None) -> Figur
 
 def joint_trajectories(motion: JointMotion, robot: Robot) -> Figure:
     """Show joint positions, velocities and accelerations of all joints over time, one below the other."""
-    kept = _thinned(len(motion.time))
+    samples = _thinned(len(motion.time))
     traces: list[Figure] = []
     panels = ((motion.joints, "y", ""), (motion.velocity, "y2", "/s"), (motion.acceleration, "y3", "/s²"))
     for values, place, per in panels:
@@ -111,8 +111,8 @@ def joint_trajectories(motion: JointMotion, robot: Robot) -> Figure:
                     "name": name,
                     "legendgroup": str(number),
                     "showlegend": place == "y",
-                    "x": rounded(motion.time[kept], 6),
-                    "y": rounded(scale * values[kept, number], 6),
+                    "x": rounded(motion.time[samples], 6),
+                    "y": rounded(scale * values[samples, number], 6),
                     "yaxis": place,
                     "line": {"color": _JOINTS[number % len(_JOINTS)], "width": 1.8},
                     "hovertemplate": f"{name}: %{{y:.4g}} {unit}{per} at %{{x:.3f}} s<extra></extra>",

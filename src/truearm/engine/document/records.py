@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from truearm.engine.base.errors import Notice, as_html, counted, has_error, listed, short_text, worst_first
-from truearm.engine.base.units import Marked, parts_of, said_of, with_mark
+from truearm.engine.base.units import Marked, mark_lines, parts_of, with_mark
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.document.document import Block, detail, held_by, leaves_of, lines_of, say
+from truearm.engine.document.document import Block, detail, json_of, leaves_of, lines_of, say
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 
@@ -39,7 +39,7 @@ class Record:
 
         A record that holds neither has a field ``simulated_from`` instead.
         """
-        return parts_of(getattr(self, one.name) for one in fields(self))  # type: ignore[arg-type]
+        return parts_of(getattr(self, entry.name) for entry in fields(self))  # type: ignore[arg-type]
 
     @property
     def written(self) -> Sequence[str]:
@@ -65,18 +65,18 @@ class Record:
     def everything(self) -> list[Block]:
         """Return its blocks, then what to do next and what to know, as a result has it that holds this one."""
         parts = self.simulated_from
-        made: list[Block] = [say(simulated=True, simulated_parts=[*parts])] if parts else []
-        made += self.blocks()
+        blocks: list[Block] = [say(simulated=True, simulated_parts=[*parts])] if parts else []
+        blocks += self.blocks()
         if hasattr(self, "next"):
-            made.append(detail(*(step.line for step in self.next), next=[step.summary() for step in self.next]))
+            blocks.append(detail(*(step.line for step in self.next), next=[step.summary() for step in self.next]))
         if hasattr(self, "warnings"):
-            made.append(detail(*notice_lines(self.warnings), warnings=notice_summaries(self.warnings)))
-        return made
+            blocks.append(detail(*notice_lines(self.warnings), warnings=notice_summaries(self.warnings)))
+        return blocks
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them, units in the names."""
-        held = held_by(self.everything())
-        return {name: held[name] for name in ("truearm",) if name in held} | held
+        summary = json_of(self.everything())
+        return {name: summary[name] for name in ("truearm",) if name in summary} | summary
 
     def as_json(self) -> Any:
         """Return what the command prints as JSON."""
@@ -114,19 +114,19 @@ def first_screen(record: Record) -> list[str]:
     if record.is_list or len(everything) < _LINES:
         return everything
     notices, steps = worst_first(getattr(record, "warnings", ())), getattr(record, "next", ())
-    mark, leaves = said_of(record.simulated_from), [*leaves_of(record.blocks())]
-    room = _LINES - len(mark) - len(steps[:1]) - 2  # the last two count the rest, and say where files are
-    grave, answer = sum(one.level == "error" for one in notices), sum(len(x.lines) for x in leaves if not x.is_detail)
-    shown = min(len(notices), _FIRST, max(1, grave, room - answer))
-    spare, text = room - shown - answer, list[str]()
+    mark, leaves = mark_lines(record.simulated_from), [*leaves_of(record.blocks())]
+    free = _LINES - len(mark) - len(steps[:1]) - 2  # the last two count the rest, and say where files are
+    grave, answer = sum(n.level == "error" for n in notices), sum(len(x.lines) for x in leaves if not x.is_detail)
+    shown = min(len(notices), _FIRST, max(1, grave, free - answer))
+    spare, text = free - shown - answer, list[str]()
     for leaf in leaves:
         if not leaf.is_detail or len(leaf.lines) <= spare:
             text += leaf.lines
             spare -= len(leaf.lines) * leaf.is_detail
-    text = [*mark, *text[: room - shown], *(step.line for step in steps[:1]), *notice_lines(notices[:shown])]
-    rest = Counter[str](notice.level for notice in notices[shown:])
-    rest["line"] = len(everything) - len(text) - rest.total()
-    more = listed([counted(count, what) for what, count in rest.items() if count])
+    text = [*mark, *text[: free - shown], *(step.line for step in steps[:1]), *notice_lines(notices[:shown])]
+    left_out = Counter[str](notice.level for notice in notices[shown:])
+    left_out["line"] = len(everything) - len(text) - left_out.total()
+    more = listed([counted(count, noun) for noun, count in left_out.items() if count])
     return [*text, f"And {more} more, which `details` shows."]
 
 
@@ -147,9 +147,9 @@ class Imported(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give what was read."""
-        data, where = self.data, "" if self.out is None else f": {self.out}"
+        data, saved = self.data, "" if self.out is None else f": {self.out}"
         many, targets = counted(data.configurations, "configuration"), list(data.targets)
-        yield say(f"{many}, targets {', '.join(targets)}{where}", configurations=data.configurations, targets=targets)
+        yield say(f"{many}, targets {', '.join(targets)}{saved}", configurations=data.configurations, targets=targets)
         lines = (f"  {name}: {count} missing {_nouns('reading', count)}" for name, count in self.missing.items())
         yield say(*lines, missing=dict(self.missing))
 
@@ -165,8 +165,8 @@ class ImportedRoboDK(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give what was read, and where the targets are in the flange frame [mm]."""
-        data, where = self.data, "" if self.out is None else f": {self.out}"
-        yield say(f"{counted(data.configurations, 'configuration')}{where}", configurations=data.configurations)
+        data, saved = self.data, "" if self.out is None else f": {self.out}"
+        yield say(f"{counted(data.configurations, 'configuration')}{saved}", configurations=data.configurations)
         points = {n: (1e3 * point).tolist() for n, point in zip(data.targets, self.tool_points, strict=True)}
         lines = (f"  target {n}: tool point ({', '.join(f'{v:g}' for v in point)}) mm" for n, point in points.items())
         yield say(*lines, tool_points_mm=points)
@@ -189,9 +189,9 @@ class ImportedCircles(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give what was read."""
-        configurations, where = self.data.configurations, "" if self.out is None else f": {self.out}"
+        configurations, saved = self.data.configurations, "" if self.out is None else f": {self.out}"
         on = f"{counted(configurations, 'configuration')} on {counted(len(self.pages), 'page')}"
-        yield say(f"{on}{where}", configurations=configurations, pages=list(self.pages))
+        yield say(f"{on}{saved}", configurations=configurations, pages=list(self.pages))
         words = f"  {self.gaps} missing {_nouns('distance', self.gaps)}, where the line has gaps"
         yield say(words if self.gaps else "", missing=self.gaps)
 

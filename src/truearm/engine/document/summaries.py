@@ -74,51 +74,51 @@ def selection_block(selection: Selection) -> Block:
 
 def errors_summary(errors: Errors) -> dict[str, Any]:
     """Return error statistics in mm and mrad, as JSON holds them."""
-    made: dict[str, Any] = {"configurations": errors.configurations}
+    summary: dict[str, Any] = {"configurations": errors.configurations}
     for key, spread, scale in (
         ("position_mm", errors.position, 1e3),
         ("orientation_mrad", errors.orientation, 1e3),
         ("length_mm", errors.length, 1e3),
     ):
         if spread is not None:
-            made[key] = _scaled(spread, scale)
-    return made
+            summary[key] = _scaled(spread, scale)
+    return summary
 
 
-def refit_block(found: Refit) -> Block:
+def refit_block(refit: Refit) -> Block:
     """Return what was found anew, by how much it moved, and what that means for the errors, in mm and deg."""
-    from_these = f"found anew from {counted(found.readings, 'reading')} ({counted(found.parameters, 'number')})"
-    turned = "" if found.turn is None else f" and turned by {degrees(found.turn)} deg"
-    moved = f"moved by {millimetres(found.shift)} mm"
-    each = listed([f"{name} {millimetres(shift)}" for name, shift in found.shifts.items()])
+    from_these = f"found anew from {counted(refit.readings, 'reading')} ({counted(refit.parameters, 'number')})"
+    turned = "" if refit.turn is None else f" and turned by {degrees(refit.turn)} deg"
+    moved = f"moved by {millimetres(refit.shift)} mm"
+    each = listed([f"{name} {millimetres(shift)}" for name, shift in refit.shifts.items()])
     words = {
         "base": f"The base was {from_these}: the readings {moved} at their middle{turned}.",
         "tool": f"The tool was {from_these}: it {moved} at the middle of its targets{turned}.",
         "targets": f"The targets were {from_these}; they moved on the flange by (mm): {each}.",
     }
-    if found.moved == "base" and found.shifts:
+    if refit.moved == "base" and refit.shifts:
         words["base"] = f"The fixtures were {from_these}; they moved before the base by (mm): {each}."
     return say(
-        words[found.moved],
+        words[refit.moved],
         "The errors of each configuration are those of what is found without it.",
         refit={
-            "moved": found.moved,
-            "readings": found.readings,
-            "parameters": found.parameters,
-            "shift_mm": found.shift * 1e3,
-            "turn_deg": None if found.turn is None else math.degrees(found.turn),
-            "shifts_mm": {name: shift * 1e3 for name, shift in found.shifts.items()},
+            "moved": refit.moved,
+            "readings": refit.readings,
+            "parameters": refit.parameters,
+            "shift_mm": refit.shift * 1e3,
+            "turn_deg": None if refit.turn is None else math.degrees(refit.turn),
+            "shifts_mm": {name: shift * 1e3 for name, shift in refit.shifts.items()},
         },
     )
 
 
 def joint_error_text(fit: Fit) -> str:
     """Return what readings of a configuration share as an error of each joint, empty if nothing; by kind of joint."""
-    found = dict[str, list[float]]()
+    by_unit = dict[str, list[float]]()
     for joint, error in zip(fit.robot.joints, fit.joint_error.tolist(), strict=True):
         if error > 0.0:
-            found.setdefault("deg" if joint.kind == "revolute" else "mm", []).append(error)
-    shown = [f"{from_si(max(errors), unit):.2g} {unit}" for unit, errors in found.items()]
+            by_unit.setdefault("deg" if joint.kind == "revolute" else "mm", []).append(error)
+    shown = [f"{from_si(max(errors), unit):.2g} {unit}" for unit, errors in by_unit.items()]
     return " and ".join(shown)
 
 

@@ -236,8 +236,8 @@ def parameter_lines(fit: Fit) -> list[str]:
     rows = [("parameter", "nominal", "value", "deviation", "unit", "")]
     for row in parameter_rows(fit):
         nominal = from_si(fit.robot.parameters[row.name].nominal, row.unit)
-        said = worth.get(row.fit_status, row.fit_status.replace("-", " "))
-        rows.append((row.name, row.fixed(nominal), row.known(row.estimate), row.deviation_text, row.unit, said))
+        status = worth.get(row.fit_status, row.fit_status.replace("-", " "))
+        rows.append((row.name, row.fixed(nominal), row.known(row.estimate), row.deviation_text, row.unit, status))
     wide = [max(len(row[k]) for row in rows) for k in range(5)]
     return [
         "  ".join(
@@ -259,8 +259,8 @@ def strongest_pairs(fit: Fit) -> list[tuple[Cell, Cell, str]]:
     order = np.argsort(-abs(r[rows, columns]), kind="stable")
     pairs = ((int(rows[k]), int(columns[k])) for k in order.tolist())
     of_convention = same_motion(fit)
-    told = islice((pair for pair in pairs if pair not in of_convention), _PAIRS)
-    return [(Cell(names[i], code=True), Cell(names[j], code=True), f"{float(r[i, j]):+.3f}") for i, j in told]
+    strongest = islice((pair for pair in pairs if pair not in of_convention), _PAIRS)
+    return [(Cell(names[i], code=True), Cell(names[j], code=True), f"{float(r[i, j]):+.3f}") for i, j in strongest]
 
 
 def noise_table(fit: Fit) -> Table:
@@ -321,13 +321,13 @@ def _noise(fit: Fit) -> str:
 
 def parameter_sentence(rows: Sequence[ParameterRow]) -> str:
     """Count the parameters by how they ended."""
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for row in rows:
-        found[row.status] = found.get(row.status, 0) + 1
+        counts[row.status] = counts.get(row.status, 0) + 1
     words = {
         "at bound": "stopped at a bound",
         "held: redundant": "held because they are redundant",
         "held": "held at known places",
     }
-    sentence = ", ".join(f"{count} {words.get(status, status)}" for status, count in found.items())
+    sentence = ", ".join(f"{count} {words.get(status, status)}" for status, count in counts.items())
     return f"{sentence}."

@@ -77,9 +77,9 @@ def bound_vectors(
 
 
 def _places(name: str, free: FreeParameters, others: Iterable[Parameter], where: str) -> list[int]:
-    found = [i for i, p in enumerate(free.parameters) if name in (p.name, _family(p))]
-    if found or any(name in (p.name, _family(p)) for p in others):
-        return found
+    indices = [i for i, p in enumerate(free.parameters) if name in (p.name, _family(p))]
+    if indices or any(name in (p.name, _family(p)) for p in others):
+        return indices
     known = sorted({*free.names, *(_family(p) for p in free.parameters)})
     raise InputError(
         "no free parameter of this model has this name",

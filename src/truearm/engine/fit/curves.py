@@ -111,14 +111,14 @@ def curve_variances(
     order = np.argsort(moved)
     small = np.zeros(len(moved), dtype=bool)
     small[order] = np.cumsum(moved[order]) <= _NEGLIGIBLE * state.noise * rows
-    kept = (state.variance > 0.0) & ~small[group]
+    significant = (state.variance > 0.0) & ~small[group]
     return CurveVariances(
-        np.where(kept, state.variance, 0.0),
+        np.where(significant, state.variance, 0.0),
         state.variance,
         state.noise,
         state.known,
         state.likelihood,
-        gains if kept.any() else {},
+        gains if significant.any() else {},
     )
 
 
@@ -137,39 +137,39 @@ def moments_without(moments: Array, others: int) -> Array:
 
 def equations_of(moments: Array, rows: float) -> Equations:
     """Return the equations that products of :func:`moments_without` are of."""
-    return Equations(*_told_apart(moments), rows)
+    return Equations(*_independent_equations(moments), rows)
 
 
-def _told_apart(moments: Array) -> tuple[Array, Array, float]:
+def _independent_equations(moments: Array) -> tuple[Array, Array, float]:
     """Return equations that curves take part in, their right side, and the sum of squares of all others.
 
     Through a part of a turn neighbouring periods look alike, so that these are far fewer than coefficients.
     """
     sizes, axes = np.linalg.eigh(moments[:-1, :-1])
-    kept = sizes > _ALIKE_EQUATIONS * max(float(sizes[-1]), 1e-300)
-    root, axes = np.sqrt(sizes[kept]), axes[:, kept]
+    independent = sizes > _ALIKE_EQUATIONS * max(float(sizes[-1]), 1e-300)
+    root, axes = np.sqrt(sizes[independent]), axes[:, independent]
     z = (axes.T @ moments[:-1, -1]) / root
     return root[:, None] * axes.T, z, max(float(moments[-1, -1] - z @ z), 0.0)
 
 
 def _start(of: Equations, joint: NDArray[np.intp], most: float) -> Array:
     """Return variances with which the curves of the joints would add as much to the residuals as there is noise."""
-    found = np.zeros(len(joint))
+    variance = np.zeros(len(joint))
     joints = np.unique(joint).tolist()
     for i in joints:
-        mine = joint == i
-        found[mine] = of.rows / max(float(of.size[mine].sum()), 1e-300) / len(joints)
-        if float(found[mine].sum()) > most:  # the readings do not see the joint turn
-            found[mine] = 0.0
-    return found
+        of_joint = joint == i
+        variance[of_joint] = of.rows / max(float(of.size[of_joint].sum()), 1e-300) / len(joints)
+        if float(variance[of_joint].sum()) > most:  # the readings do not see the joint turn
+            variance[of_joint] = 0.0
+    return variance
 
 
 class Equations:
     """What is left of the equations: derivatives by the coefficients, right side, and what no curve can explain."""
 
-    def __init__(self, F: Array, z: Array, rest: float, rows: float) -> None:
+    def __init__(self, F: Array, z: Array, residual_square: float, rows: float) -> None:
         self.F, self.z, self.rows = F, z, rows
-        self.H, self.b, self.squares = F.T @ F, F.T @ z, float(z @ z) + rest
+        self.H, self.b, self.squares = F.T @ F, F.T @ z, float(z @ z) + residual_square
         self.size = np.diag(self.H).copy()
 
 
@@ -185,16 +185,16 @@ class Marginal:
         self._used = used = self.variance > 0.0
         v, b = self.variance[used], of.b[used]
         root = np.sqrt(v / noise)
-        self.found = np.zeros(len(variance))
+        self.estimate = np.zeros(len(variance))
         if used.sum() <= len(of.F):
             self._part: Array | None = None
             self._triangle, logs = _factored(np.eye(len(v)) + root[:, None] * of.H[np.ix_(used, used)] * root)
-            self.found[used] = root * _solved(self._triangle, root * b)
+            self.estimate[used] = root * _solved(self._triangle, root * b)
         else:
             self._part = part = of.F[:, used] * root
             self._triangle, logs = _factored(np.eye(len(part)) + part @ part.T)
-            self.found[used] = root * (part.T @ _solved(self._triangle, of.z))
-        c = self.found[used]
+            self.estimate[used] = root * (part.T @ _solved(self._triangle, of.z))
+        c = self.estimate[used]
         explained = float(b @ c)
         moved = of.F[:, used] @ c
         self.left = max(of.squares - 2.0 * explained + float(moved @ moved), 0.0)
@@ -268,7 +268,7 @@ class _Climb:
     def following(self, state: Marginal) -> Array:
         """Return where the next step leads: logarithms of the variances of the groups, and of the noise."""
         v = np.bincount(self.group, state.variance) / self.sizes
-        squares, known = np.bincount(self.group, state.found**2), np.bincount(self.group, state.known)
+        squares, known = np.bincount(self.group, state.estimate**2), np.bincount(self.group, state.known)
         new = (squares + _ALIKE * self.alike(v)) / (known + _ALIKE)
         freedom = max(state.of.rows - float(state.known.sum()), 1e-3 * state.of.rows)
         return np.asarray(np.log(np.maximum(np.append(np.where(v > 0.0, new, 0.0), state.left / freedom), 1e-300)))
@@ -280,22 +280,24 @@ class _Climb:
 
     def climbed(self, state: Marginal) -> Marginal:
         """Climb: two steps, and a third as far as they lead together (Varadhan and Roland 2008)."""
-        here = np.log(np.maximum(np.append(np.bincount(self.group, state.variance) / self.sizes, state.noise), 1e-300))
+        current = np.log(
+            np.maximum(np.append(np.bincount(self.group, state.variance) / self.sizes, state.noise), 1e-300)
+        )
         height = self.objective(state)
         for _ in range(_STEPS):
             first = self.following(state)
             second_state = self.at(state, first)
             second = self.following(second_state)
-            way, bend = first - here, second - 2.0 * first + here
+            way, bend = first - current, second - 2.0 * first + current
             far = min(-float(np.linalg.norm(way)) / max(float(np.linalg.norm(bend)), 1e-300), -1.0)
-            place = here - 2.0 * far * way + far**2 * bend
-            there = self.at(state, place)
-            reached = self.objective(there)
+            place = current - 2.0 * far * way + far**2 * bend
+            trial = self.at(state, place)
+            reached = self.objective(trial)
             if not reached >= height:
                 place = second
-                there = self.at(state, second)
-                reached = self.objective(there)
-            gain, height, here, state = reached - height, reached, place, there
+                trial = self.at(state, second)
+                reached = self.objective(trial)
+            gain, height, current, state = reached - height, reached, place, trial
             if gain < _SETTLED:
                 break
         return state
@@ -366,15 +368,15 @@ def expected_variances(of: CurveMoments, likeliest: Array) -> Array:
     level = float(weights @ _LEVELS / weights.sum())
     seen = np.where(line, likeliest, level * quiet)
     size, probable = (PRIOR / of.period) ** 2, np.where(band == 1, 1.0, _PROBABLE)
-    found = np.maximum(seen, size)  # from above: what is taken for zero would tell its neighbours
+    expected = np.maximum(seen, size)  # from above: what is taken for zero would tell its neighbours
     for _ in range(_ROUNDS):
-        information, squares = _told(equations.F, equations.z, found)
+        information, squares = _information(equations.F, equations.z, expected)
         known = size * information / (1.0 + size * information)
         size, probable = _levels(known**_WELL, squares, line, of.period, band)
         of_line = size / probable
         missed = probable / (1.0 + of_line * information)
-        found = np.maximum(seen, missed / (missed + 1.0 - probable) * of_line)
-    return np.asarray(found)
+        expected = np.maximum(seen, missed / (missed + 1.0 - probable) * of_line)
+    return np.asarray(expected)
 
 
 def curve_covariance(of: CurveMoments, variance: Array, certain: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -415,14 +417,14 @@ def _quiet(likeliest: Array, joint: NDArray[np.intp], band: NDArray[np.intp]) ->
     for i in np.unique(joint):
         median[joint == i] = np.median(likeliest[joint == i])
         for b in np.unique(band):
-            mine = (joint == i) & (band == b)
-            some = likeliest[mine & (likeliest > 0.0)]
-            quiet[mine] = len(some) / float(np.sum(1.0 / some)) if len(some) else 0.0
+            in_band = (joint == i) & (band == b)
+            some = likeliest[in_band & (likeliest > 0.0)]
+            quiet[in_band] = len(some) / float(np.sum(1.0 / some)) if len(some) else 0.0
     least = np.maximum(_ABOVE_JOINT * median, 1e-9 * PRIOR**2)
     return quiet, (likeliest > _ABOVE_BAND * quiet) | (likeliest > least)
 
 
-def _told(F: Array, z: Array, variance: Array) -> tuple[Array, Array]:
+def _information(F: Array, z: Array, variance: Array) -> tuple[Array, Array]:
     """Return what the equations know of each coefficient with the others of such variances, and its second moment."""
     turned = np.linalg.solve(np.eye(len(F)) + (F * variance) @ F.T, np.column_stack([F, z]))
     with_own = np.einsum("ij,ij->j", F, turned[:, :-1])
@@ -436,17 +438,19 @@ def _levels(
 ) -> tuple[Array, Array]:
     """Return what the square of a coefficient is expected to be by its periods, and the probability of a line."""
     count = int(period.max(initial=0)) + 1
-    told = np.bincount(period, known, count)
+    known_of_period = np.bincount(period, known, count)
     square, lines = np.bincount(period, known * squares, count), np.bincount(period, known * line, count)
     size, probable = np.zeros(count), np.zeros(count)
     for b in np.unique(band):
-        mine = np.unique(period[band == b])
-        before = float(np.mean((PRIOR / mine) ** 2))
+        periods = np.unique(period[band == b])
+        before = float(np.mean((PRIOR / periods) ** 2))
         # The expectation of a variance is larger than its scale, by two degrees of freedom.
-        of_band = (square[mine].sum() + _BELIEVED * before) / (told[mine].sum() + _BELIEVED - 2.0)
-        size[mine] = (square[mine] + _BELIEVED_OF_BAND * of_band) / (told[mine] + _BELIEVED_OF_BAND)
-        share = (lines[mine].sum() + _BELIEVED * _PROBABLE) / (told[mine].sum() + _BELIEVED)
-        probable[mine] = (lines[mine] + _BELIEVED_OF_BAND * share) / (told[mine] + _BELIEVED_OF_BAND)
+        of_band = (square[periods].sum() + _BELIEVED * before) / (known_of_period[periods].sum() + _BELIEVED - 2.0)
+        size[periods] = (square[periods] + _BELIEVED_OF_BAND * of_band) / (known_of_period[periods] + _BELIEVED_OF_BAND)
+        share = (lines[periods].sum() + _BELIEVED * _PROBABLE) / (known_of_period[periods].sum() + _BELIEVED)
+        probable[periods] = (lines[periods] + _BELIEVED_OF_BAND * share) / (
+            known_of_period[periods] + _BELIEVED_OF_BAND
+        )
     probable = np.clip(probable, _LEAST_PROBABLE, 1.0 - _LEAST_PROBABLE)
     return size[period], np.where(band == 1, 1.0, probable[period])
 
@@ -530,7 +534,7 @@ def with_stiffness(
         crowd = max(1.0, problem.rows / (_COORDINATES * (int(problem.visits.max(initial=0)) + 1)))
     of = curve_moments(problem, curves, joints, weight, crowd)
     declared = any(block.declared for block in problem.blocks)
-    found = curve_variances(
+    estimate = curve_variances(
         moments_without(of.moments, len(of.away) - len(names)),
         of.rows,
         of.joint,
@@ -538,25 +542,25 @@ def with_stiffness(
         least_noise=problem.widened**-2 if declared else 0.0,
         most=LARGEST,
     )
-    variances = {name: v for name, v in zip(names, found.variance.tolist(), strict=True) if v > 0.0}
+    variances = {name: v for name, v in zip(names, estimate.variance.tolist(), strict=True) if v > 0.0}
     if {curves.places[name][0] for name in curves.variances} - {curves.places[name][0] for name in variances}:
         return problem, replace(curves, rounds=0), joints  # the curve of a joint that was found once is not lost again
-    now = {p.name: p for p in problem.free.parameters}
-    kept = [p for p in every.parameters if p.name in (variances if p.name in curves.places else now)]
+    current = {p.name: p for p in problem.free.parameters}
+    parameters = [p for p in every.parameters if p.name in (variances if p.name in curves.places else current)]
     free = FreeParameters(
         tuple(
             replace(robot.parameters[p.name], prior=math.sqrt(variances[p.name]))
             if p.name in variances
-            else now[p.name]
-            for p in kept
+            else current[p.name]
+            for p in parameters
         )
     )
-    held = {p.name: p.nominal for p in coefficients if p.name not in variances}
-    ratio = min(1.0, math.sqrt(found.noise)) if variances else 1.0
+    fixed = {p.name: p.nominal for p in coefficients if p.name not in variances}
+    ratio = min(1.0, math.sqrt(estimate.noise)) if variances else 1.0
     joining = bool(variances) and not curves.variances  # what widened declared deviations may have been the curves
     left = replace(
         problem,
-        robot=robot.with_values(held),
+        robot=robot.with_values(fixed),
         free=free,
         noise={name: ratio * deviation for name, deviation in problem.noise.items()},
         widened=1.0 if joining else max(1.0, problem.widened * ratio),
@@ -564,9 +568,9 @@ def with_stiffness(
     known = replace(
         curves,
         variances=variances,
-        likeliest=found.full,
+        likeliest=estimate.full,
         design_effect=crowd if variances else 1.0,
-        gains=found.gains,
+        gains=estimate.gains,
         rounds=curves.rounds - 1 if variances else 0,
     )
     return left, known, joints * ratio**2
@@ -584,16 +588,16 @@ def curve_moments(problem: Problem, curves: Curves, joints: Array, weight: Array
     names, robot = curves.names, problem.robot
     others = [p for p in problem.free.parameters if p.name not in curves.places]
     whole = replace(problem, free=FreeParameters((*others, *(robot.parameters[name] for name in names))))
-    here = whole.at(whole.free.start)
+    evaluation = whole.at(whole.free.start)
     prior = np.array([p.prior for p in others])
     whitening = None
     if joints.any():
-        whitening = Whitening(Visits(whole.visits), here.by_joints * np.sqrt(joints))
+        whitening = Whitening(Visits(whole.visits), evaluation.by_joints * np.sqrt(joints))
     root = np.sqrt(np.repeat(weight, whole.components) / crowd)
     away = whole.free.start - whole.free.nominal
     moments = np.zeros((len(away) + 1, len(away) + 1))
     scale = np.concatenate([prior, np.ones(len(names))])
-    for equations, portion in here.portions():
+    for equations, portion in evaluation.portions():
         residual, jacobian, weights = portion.residual, portion.jacobian, root[equations]
         if whitening is not None:
             alone = whitening.of(equations)
@@ -604,7 +608,7 @@ def curve_moments(problem: Problem, curves: Curves, joints: Array, weight: Array
             part *= weights[rows, None]
             moments += part.T @ part
     place = np.array([curves.places[name] for name in names], dtype=np.intp).reshape(-1, 2)
-    size = np.sum((here.by_joints * root[:, None]) ** 2, axis=0)
+    size = np.sum((evaluation.by_joints * root[:, None]) ** 2, axis=0)
     return CurveMoments(moments, whole.rows / crowd, away / scale, place[:, 0], place[:, 1], size)
 
 
@@ -636,7 +640,7 @@ def parts_with_curves(
     others = [p for p in free.parameters if p.name not in curves.places]
     place = {name: k for k, name in enumerate((*(p.name for p in others), *names))}
     sure = np.zeros(len(place), dtype=bool)
-    sure[[place[name] for name, one in zip(free.names, certain.tolist(), strict=True) if one]] = True
+    sure[[place[name] for name, is_certain in zip(free.names, certain.tolist(), strict=True) if is_certain]] = True
     whole, beforehand = curve_covariance(of, variance, sure)
     fitted = set(free.names)
     more = [name for name, on in zip(names, that_matter(of, variance).tolist(), strict=True) if on]

@@ -197,8 +197,8 @@ class OfPredictions(Objective):
 
 def observability(information: Array, configurations: int) -> dict[str, float]:
     """Return the indices O1 to O5 of an information matrix ``(m, m)`` gathered at so many configurations."""
-    found = {name: float(np.exp(index.value(information))) for name, index in INDICES.items()}
-    return found | {"O1": found["O1"] / float(np.sqrt(configurations))}
+    values = {name: float(np.exp(index.value(information))) for name, index in INDICES.items()}
+    return values | {"O1": values["O1"] / float(np.sqrt(configurations))}
 
 
 def _ends(eigenvalues: Array, smallest: float, largest: float) -> Array:

@@ -14,7 +14,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.curves import parts_with_curves
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.likelihood import Visits
 from truearm.engine.fit.losses import ABSOLUTE, Loss, pulls, scales_of_pulls
 from truearm.engine.fit.models import FRAMES, Model
@@ -33,13 +33,13 @@ from truearm.engine.fit.rounds import (
     Solved,
     assumed_noise,
     bound_by,
+    estimated_noise,
     evaluated,
     excess_of,
     factors_of,
     find_parameters,
     in_the_middle,
     informed_rows,
-    noise_found,
     solve_with_joints,
 )
 from truearm.engine.fit.solver import SMALL, Solution
@@ -89,20 +89,20 @@ def refit_draws(
     values = zip(problem.free.parameters, solved.solution.vector.tolist(), strict=True)
     started = FreeParameters(tuple(replace(p, value=value) for p, value in values))
     rng = np.random.default_rng((seed, count))
-    found = np.empty((count, len(started.names)))
+    draws = np.empty((count, len(started.names)))
     for number in range(count):
         progress(f"bootstrap {_bar(number, count)} {number + 1} of {count}")
         drawn = problem.data.of_configurations(rng.integers(n, size=n))
         again = replace(problem, data=drawn, free=started)
-        found[number] = solve_with_joints(
+        draws[number] = solve_with_joints(
             again, joints, loss, solved.limits, _SMALL, solved.curves.design_effect
         ).vector
-    return found
+    return draws
 
 
-def _bar(done: int, count: int, width: int = 20) -> str:
+def _bar(finished: int, count: int, width: int = 20) -> str:
     """Return how much is done, drawn with characters."""
-    full = width * done // count
+    full = width * finished // count
     return f"[{'#' * full}{'.' * (width - full)}]"
 
 
@@ -185,7 +185,7 @@ class Fit:
     assumed: tuple[str, ...]
     loss: Loss  #: Of the readings.
     steps: int  #: Steps of the solver, over all stages.
-    held: Held = NOTHING_HELD  #: Places that were known, and not found.
+    fixed: FixedPlaces = NOTHING_FIXED  #: Places that were known, and not found.
     bootstrap: int = 0  #: How many fits to configurations drawn anew the covariance follows from; 0 if from none.
     #: Coefficients of joint curves that are zero, and uncertain: the data could not tell them.
     unfitted: tuple[str, ...] = ()
@@ -197,7 +197,7 @@ class Fit:
         if any(name == r.dropped for r in self.redundancies):
             return "dropped"
         if name not in self.free.names:
-            return "held" if name in self.held.names(self.robot) else "fixed"
+            return "held" if name in self.fixed.names(self.robot) else "fixed"
         if name in self.at_bound:
             return "at-bound"
         informed = self.robot.parameters[name].informed
@@ -227,7 +227,7 @@ def identify(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
-    held: Held = NOTHING_HELD,
+    fixed: FixedPlaces = NOTHING_FIXED,
     bootstrap: int = 0,
     seed: int = 0,
     small: float = SMALL,
@@ -245,7 +245,7 @@ def identify(
             ones do no harm. ``drop``: no priors; redundant parameters are held at nominal and named. ``none``: no
             priors, and nothing is held; what neither bounds nor the readings determine ends in ``rank-loss``.
         bounds: Limits of parameter values.
-        held: Places that are known: they are not found.
+        fixed: Places that are known: they are not found.
         bootstrap: How many fits to configurations drawn anew the deviations follow from; 0: from the readings' own
             scatter.
         seed: Of those draws.
@@ -264,23 +264,23 @@ def identify(
         redundancy=redundancy,
         bounds=bounds,
         bounds_file=bounds_file,
-        held=held,
+        fixed=fixed,
         small=small,
     )
     draws = refit_draws(solved, loss, bootstrap, seed, progress) if bootstrap else None
     return _fit(solved, model, loss, draws)
 
 
-def place(robot: Robot, data: Dataset, loss: Loss = "linear", held: Held = NOTHING_HELD) -> Robot:
+def place(robot: Robot, data: Dataset, loss: Loss = "linear", fixed: FixedPlaces = NOTHING_FIXED) -> Robot:
     """Return the uncalibrated robot in the frames of the data: only base, targets and fixtures are fitted.
 
     Readings are weighed one by one. What an uncalibrated robot leaves is no error of the joints at a visit.
     """
-    if held:
-        start = start_from_readings(FRAMES.prepared(robot), data, held)
-        if not held.free_of(unanchored(FRAMES.free(start), data), start).names:
+    if fixed:
+        start = start_from_readings(FRAMES.prepared(robot), data, fixed)
+        if not fixed.free_of(unanchored(FRAMES.free(start), data), start).names:
             return start
-    return find_parameters(robot, data, FRAMES, loss=loss, held=held, shared=False).robot
+    return find_parameters(robot, data, FRAMES, loss=loss, fixed=fixed, shared=False).robot
 
 
 def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -> Fit:
@@ -289,7 +289,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
     at_bound = bound_by(solution, free, limits)
     components, count = solved.components, len(start.joints)
     joint_error, joint_freedom = np.zeros(count), np.full(count, np.inf)
-    noise = noise_found(problem, solution, loss)
+    noise = estimated_noise(problem, solution, loss)
     declared = {problem.kind(b) for b in problem.blocks if b.declared} - {SETUP}
     if components is None:
         excess = excess_of({name: noise[name] for name in noise if name in declared}) if declared else 1.0
@@ -308,12 +308,12 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         for n, v, d, i, bound in zip(free.names, x, deviation, informed, at_bound, strict=True)
     ]
     robot = in_the_middle(start.with_parameters(identified), problem.data)
-    held = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
+    dropped = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     # What is expected of curves is found from the data, and their deviations say where nothing else is known.
-    looked_at = FreeParameters((*(robot.parameters[n] for n in free.names if n not in solved.curves.places), *held))
-    unobservable = unobservable_parameters(robot, problem.data, looked_at, held=solved.held)
+    looked_at = FreeParameters((*(robot.parameters[n] for n in free.names if n not in solved.curves.places), *dropped))
+    unobservable = unobservable_parameters(robot, problem.data, looked_at, fixed=solved.fixed)
     unobservable = tuple(dict.fromkeys((*unobservable, *open_)))
-    gauge = gauge_freedoms(problem.data, solved.held)
+    gauge = gauge_freedoms(problem.data, solved.fixed)
     if open_:  # along them the solver has no reason to stop
         status = Status.RANK_LOSS
     elif not solution.converged:
@@ -359,7 +359,7 @@ def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -
         assumed=assumed_noise(problem, components, spent),
         loss=loss,
         steps=solution.steps,
-        held=solved.held,
+        fixed=solved.fixed,
         bootstrap=0 if draws is None else len(draws),
         unfitted=unfitted,
     )
@@ -394,14 +394,14 @@ def _worth(
     parts, unfitted = tuple(part.scaled(free.prior) for part in parts), tuple[str, ...]()
     if solved.curves.variances:
         known = dict(zip(free.names, x.tolist(), strict=True))
-        there = replace(
+        at_solution = replace(
             problem,
             robot=problem.robot.with_values(known),
             free=FreeParameters(tuple(replace(p, value=known[p.name]) for p in free.parameters)),
         )
         joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
         alone = parts[0] if scattered or draws is not None else None
-        unfitted, parts = parts_with_curves(there, solved.curves, joints, solution.weight, at_bound, alone)
+        unfitted, parts = parts_with_curves(at_solution, solved.curves, joints, solution.weight, at_bound, alone)
         covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
     return covariance, parts, informed, unfitted
 
@@ -426,8 +426,8 @@ def _pulled(
     root, prior = np.sqrt(design_effect), problem.free.prior
     scales = scales_of_pulls(loss, solution.residual / root, problem.components, len(prior))
     for rows, part in evaluated(problem, solution).portions():
-        pull, told = pulls(loss, part.residual / root, part.jacobian / root, part.problem.components, scales)
-        yield rows, told * prior, pull * prior
+        pull, sensitivity = pulls(loss, part.residual / root, part.jacobian / root, part.problem.components, scales)
+        yield rows, sensitivity * prior, pull * prior
 
 
 def _beforehand(problem: Problem, limits: tuple[Array, Array] | None, left_open: Sequence[str]) -> Array:
@@ -450,8 +450,8 @@ def _of_draws(draws: Array, parts: tuple[CovariancePart, ...]) -> tuple[Array, t
     What is known beforehand holds every draw in the same place: as for the readings' own scatter, that part is added.
     """
     scatter = CovariancePart(np.atleast_2d(np.cov(draws, rowvar=False)), float(len(draws) - 1))
-    rest = parts[-1]
-    return widening(scatter.freedom) ** 2 * scatter.covariance + rest.covariance, (scatter, rest)
+    remaining = parts[-1]
+    return widening(scatter.freedom) ** 2 * scatter.covariance + remaining.covariance, (scatter, remaining)
 
 
 def _left_open(problem: Problem, vector: Array, limits: tuple[Array, Array] | None) -> list[str]:
@@ -459,13 +459,13 @@ def _left_open(problem: Problem, vector: Array, limits: tuple[Array, Array] | No
     low, high = (np.full(len(vector), side) for side in (-np.inf, np.inf)) if limits is None else limits
     bounded = {name for name, a, b in zip(problem.free.names, low, high, strict=True) if np.isfinite(b - a)}
     size = dict(zip(problem.free.names, problem.free.prior.tolist(), strict=True))
-    found = []
+    parameters = []
     for redundancy in find_redundancies(problem, vector):
         along = {name: abs(c) / size[name] for name, c in redundancy.members.items()}
         taking = [name for name, share in along.items() if share > _LEAST_PART * max(along.values())]
         if not bounded.intersection(taking):
-            found += taking
-    return found
+            parameters += taking
+    return parameters
 
 
 def _unobservable_combinations(problem: Problem, vector: Array) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ import numpy as np
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.data.dataset import Dataset, IntArray
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform, rotation_from_quaternion
@@ -39,18 +39,18 @@ class _Placement:
     left_over: Array
 
 
-def initial_frames(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Robot:
+def initial_frames(robot: Robot, data: Dataset, fixed: FixedPlaces = NOTHING_FIXED) -> Robot:
     """Return the robot placed where the data say it stands, with the data's targets on its flange.
 
     Args:
         robot: Its kinematic parameters are used as they are; its own base and targets are left out of account.
         data: At least one position reading; orientations are used where present.
-        held: Places that are known: those are not found, and the others agree with them.
+        fixed: Places that are known: those are not found, and the others agree with them.
 
     Raises:
         InputError: If no target has a position.
     """
-    placement = _placements([robot.with_frames(Transform(), {})], [data], held)[0]
+    placement = _placements([robot.with_frames(Transform(), {})], [data], fixed)[0]
     return robot.with_frames(placement.base, placement.targets)  # type: ignore[arg-type]
 
 
@@ -61,7 +61,7 @@ def placed_errors(robot: Robot, tried: Sequence[Dataset]) -> list[Array]:
         robot: At the origin, with no targets.
         tried: Data that the robot is placed by one after the other; many of them together take little longer than one.
     """
-    return _left_over(_placements([robot] * len(tried), tried, NOTHING_HELD))
+    return _left_over(_placements([robot] * len(tried), tried, NOTHING_FIXED))
 
 
 def errors_of_placed(robots: Sequence[Robot], data: Dataset) -> list[Array]:
@@ -71,23 +71,23 @@ def errors_of_placed(robots: Sequence[Robot], data: Dataset) -> list[Array]:
         robots: At the origin, with no targets; many of them together take little longer than one.
         data: What each of them is placed by, as :func:`initial_frames` does.
     """
-    return _left_over(_placements(robots, [data] * len(robots), NOTHING_HELD))
+    return _left_over(_placements(robots, [data] * len(robots), NOTHING_FIXED))
 
 
 def _left_over(placements: Sequence[_Placement]) -> list[Array]:
     return [np.asarray(np.linalg.norm(placement.left_over, axis=1)) for placement in placements]
 
 
-def _placements(robots: Sequence[Robot], tried: Sequence[Dataset], held: Held) -> list[_Placement]:
+def _placements(robots: Sequence[Robot], tried: Sequence[Dataset], fixed: FixedPlaces) -> list[_Placement]:
     """Return where each of the data say that its robot stands, which is at the origin and has no targets."""
-    rows = [_rows(placed, data, held) for placed, data in zip(robots, tried, strict=True)]
+    rows = [_rows(placed, data, fixed) for placed, data in zip(robots, tried, strict=True)]
     if not rows:
         return []
-    if held.base is not None:
-        return [_placed(own, held.base.rotation, data, held) for own, data in zip(rows, tried, strict=True)]
+    if fixed.base is not None:
+        return [_placed(own, fixed.base.rotation, data, fixed) for own, data in zip(rows, tried, strict=True)]
     G, g = np.array([own.M.T @ own.M for own in rows]), np.array([own.M.T @ own.m for own in rows])
     bases = _nearest_rotations(G, g)
-    return [_placed(own, base, data, held) for own, base, data in zip(rows, bases, tried, strict=True)]
+    return [_placed(own, base, data, fixed) for own, base, data in zip(rows, bases, tried, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +102,12 @@ class _Rows:
     centre: Array  #: Mean of the readings [m].
     R: Array  #: Of the flange ``(configurations, 3, 3)``.
     seen: list[int]  #: seen, found: targets that were read, and those whose place is not known.
-    found: list[int]
+    searched: list[int]
     #: Configurations and rotations of the orientation readings of each target.
     rotations: Mapping[int, tuple[IntArray, Array]]
 
 
-def _rows(placed: Robot, data: Dataset, held: Held) -> _Rows:
+def _rows(placed: Robot, data: Dataset, fixed: FixedPlaces) -> _Rows:
     p, R = placed.world_poses(data.postures)
     with_position = data.has_position
     if not with_position.any():
@@ -116,21 +116,21 @@ def _rows(placed: Robot, data: Dataset, held: Held) -> _Rows:
     seen = np.unique(data.target[readings]).tolist()
     refuse_beyond("parameters", 3 * len(seen) + 3, where=data.source)
     refuse_beyond("derivatives", len(readings) * 3 * (3 * len(seen) + 3), where=data.source)
-    where, what = data.configuration[readings], data.target[readings]
+    configuration, target = data.configuration[readings], data.target[readings]
     centre = data.position[readings].mean(axis=0)
     y = data.position[readings] - centre
 
     # R' y - p_c = R_c t + u: left side linear in the nine entries of R, right side in the targets and u.
-    left = p[where]
-    given = {t: held.targets[data.targets[t]] for t in seen if data.targets[t] in held.targets}
-    for t, place in given.items():
-        mine = what == t
-        left[mine] += R[where[mine]] @ np.array(place.translation)
-    found = [t for t in seen if t not in given]
-    blocks = np.zeros((len(readings), 3, 3 * len(found) + 3))
-    for column, t in enumerate(found):
-        mine = what == t
-        blocks[mine, :, 3 * column : 3 * column + 3] = R[where[mine]]
+    left = p[configuration]
+    fixed_targets = {t: fixed.targets[data.targets[t]] for t in seen if data.targets[t] in fixed.targets}
+    for t, place in fixed_targets.items():
+        of_target = target == t
+        left[of_target] += R[configuration[of_target]] @ np.array(place.translation)
+    searched = [t for t in seen if t not in fixed_targets]
+    blocks = np.zeros((len(readings), 3, 3 * len(searched) + 3))
+    for column, t in enumerate(searched):
+        of_target = target == t
+        blocks[of_target, :, 3 * column : 3 * column + 3] = R[configuration[of_target]]
     blocks[:, :, -3:] = np.eye(3)
     known = blocks.reshape(-1, blocks.shape[2])
     entries = np.zeros((len(readings), 3, 9))
@@ -144,9 +144,9 @@ def _rows(placed: Robot, data: Dataset, held: Held) -> _Rows:
 
     rotations = {t: _orientations(data, t) for t in seen}
     for t, (where_t, Y) in rotations.items():
-        if t in given:  # R' Y = R_c Q with Q known
+        if t in fixed_targets:  # R' Y = R_c Q with Q known
             M = np.concatenate([M, _ARM * _turned_back(Y)])
-            m = np.concatenate([m, _ARM * (R[where_t] @ given[t].rotation).reshape(-1)])
+            m = np.concatenate([m, _ARM * (R[where_t] @ fixed_targets[t].rotation).reshape(-1)])
             continue
         before, after = _turn_axes(R[where_t]), _turn_axes(Y)
         rows = np.zeros((len(before), 3, 9))
@@ -155,24 +155,24 @@ def _rows(placed: Robot, data: Dataset, held: Held) -> _Rows:
         M = np.concatenate([M, _ARM * rows.reshape(-1, 9)])
         m = np.concatenate([m, _ARM * after.reshape(-1)])
 
-    return _Rows(M, m, turned, left, known, centre, R, seen, found, rotations)
+    return _Rows(M, m, turned, left, known, centre, R, seen, searched, rotations)
 
 
-def _placed(rows: _Rows, base: Array, data: Dataset, held: Held) -> _Placement:
+def _placed(rows: _Rows, base: Array, data: Dataset, fixed: FixedPlaces) -> _Placement:
     """Return the places that go best with a rotation of the base."""
     known, centre, R, rotations = rows.known, rows.centre, rows.R, rows.rotations
     right = rows.turned @ base.reshape(-1) - rows.left
-    if held.base is not None:  # u = R' (p - centre) with p known: it goes to the right side
-        right -= np.tile(base.T @ (np.array(held.base.translation) - centre), len(right) // 3)
+    if fixed.base is not None:  # u = R' (p - centre) with p known: it goes to the right side
+        right -= np.tile(base.T @ (np.array(fixed.base.translation) - centre), len(right) // 3)
         known = known[:, :-3]
     solution = np.zeros(0)
     if known.shape[1]:
         solution = np.asarray(np.linalg.lstsq(known, right, rcond=1e-10)[0], dtype=np.float64)
     places: dict[str, Transform | Array] = {}
-    for t in set(rows.seen) - set(rows.found):
-        place = held.targets[data.targets[t]]
+    for t in set(rows.seen) - set(rows.searched):
+        place = fixed.targets[data.targets[t]]
         places[data.targets[t]] = place if len(rotations[t][0]) else np.array(place.translation)
-    for column, t in enumerate(rows.found):
+    for column, t in enumerate(rows.searched):
         point = solution[3 * column : 3 * column + 3]
         where_t, Y = rotations[t]
         if len(where_t):
@@ -182,7 +182,7 @@ def _placed(rows: _Rows, base: Array, data: Dataset, held: Held) -> _Placement:
         else:
             places[data.targets[t]] = point
     places = {name: places[name] for name in (data.targets[t] for t in rows.seen)}
-    stands = held.base or Transform.from_matrix(base, base @ solution[-3:] + centre)
+    stands = fixed.base or Transform.from_matrix(base, base @ solution[-3:] + centre)
     return _Placement(stands, places, (right - known @ solution).reshape(-1, 3))
 
 
@@ -201,10 +201,10 @@ def _column_space(A: Array) -> Array:
 
 def _orientations(data: Dataset, target: int) -> tuple[IntArray, Array]:
     """Return configuration indices and rotations of the orientation readings of a target."""
-    mine = np.flatnonzero(data.has_orientation & (data.target == target))
-    if data.quaternion is None or len(mine) == 0:
+    readings = np.flatnonzero(data.has_orientation & (data.target == target))
+    if data.quaternion is None or len(readings) == 0:
         return np.zeros(0, dtype=np.intp), np.zeros((0, 3, 3))
-    return data.configuration[mine], rotation_from_quaternion(data.quaternion[mine])
+    return data.configuration[readings], rotation_from_quaternion(data.quaternion[readings])
 
 
 def _turn_axes(R: Array) -> Array:
@@ -233,10 +233,10 @@ def _nearest_rotations(G: Array, g: Array) -> Array:
         left = left[np.where(better, size[..., 0], 0.0).max(axis=1) >= 1e-12]
         if len(left) == 0:
             break
-    found = best[np.arange(len(G)), np.argmin(costs, axis=1)][:, None]
-    last = _newton_step(G, g, found)  # the cost is flat to rounding where the slope is not yet
+    nearest = best[np.arange(len(G)), np.argmin(costs, axis=1)][:, None]
+    last = _newton_step(G, g, nearest)  # the cost is flat to rounding where the slope is not yet
     flat = np.linalg.norm(last, axis=2)[..., None, None] < _FLAT
-    return np.asarray(np.where(flat, found @ _rotations(last), found)[:, 0])
+    return np.asarray(np.where(flat, nearest @ _rotations(last), nearest)[:, 0])
 
 
 #: Angle about a minimum within which rounding hides how the cost changes, amply [rad].

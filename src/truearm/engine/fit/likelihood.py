@@ -42,9 +42,9 @@ class Visits:
         order = np.argsort(self.of_row, kind="stable")
         first = np.cumsum(sizes) - sizes
         return tuple(
-            (mine, order[first[mine][:, None] + np.arange(size)])
+            (of_size, order[first[of_size][:, None] + np.arange(size)])
             for size in np.unique(sizes).tolist()
-            if len(mine := np.flatnonzero(sizes == size))
+            if len(of_size := np.flatnonzero(sizes == size))
         )
 
     def of(self, rows: Rows) -> Visits:
@@ -55,17 +55,17 @@ class Visits:
 
     def products(self, left: Array, right: Array) -> Array:
         """Return ``left' right`` of each visit, ``(visits, a, b)``, for ``(rows, a)`` and ``(rows, b)``."""
-        found = np.empty((self.count, left.shape[1], right.shape[1]))
-        for mine, rows in self.alike:
-            found[mine] = np.swapaxes(left[rows], 1, 2) @ right[rows]
-        return found
+        products = np.empty((self.count, left.shape[1], right.shape[1]))
+        for of_size, rows in self.alike:
+            products[of_size] = np.swapaxes(left[rows], 1, 2) @ right[rows]
+        return products
 
     def spread(self, left: Array, right: Array) -> Array:
         """Return ``left right`` of each visit, ``(rows, b)``, for ``(rows, a)`` and ``(visits, a, b)``."""
-        found = np.empty((len(left), right.shape[2]))
-        for mine, rows in self.alike:
-            found[rows] = left[rows] @ right[mine]
-        return found
+        spread = np.empty((len(left), right.shape[2]))
+        for of_size, rows in self.alike:
+            spread[rows] = left[rows] @ right[of_size]
+        return spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ class WhitenedEvaluation:
 
 
 #: Products of parameters and joints that are kept for all visits, and that are gone through at once.
-_KEPT: Final = 16_000_000
+_MOST_STORED: Final = 16_000_000
 _AT_ONCE: Final = 2_000_000
 
 #: Share of the largest information that is added where a matrix is singular but for rounding, in turn.
@@ -246,21 +246,21 @@ class Moments:
         self.M = np.empty((factors, at.visits.count, joints, joints))
         self.t = np.empty((factors, at.visits.count, joints))
         self.C, self.c, self.q = np.zeros((factors, p, p)), np.zeros((factors, p)), np.zeros(factors)
-        kept: list[tuple[NDArray[np.intp], Array]] = []
-        fits = self.t.size * p <= _KEPT
+        stored: list[tuple[NDArray[np.intp], Array]] = []
+        fits = self.t.size * p <= _MOST_STORED
         for rows, Q, z in at.turned():
             whole = np.column_stack([Q, z])
             for index in range(factors):
-                mine = whole if factors == 1 else whole[at.factor[rows] == index]
-                square = mine.T @ mine
+                of_factor = whole if factors == 1 else whole[at.factor[rows] == index]
+                square = of_factor.T @ of_factor
                 self.C[index] += square[:-1, :-1]
                 self.c[index] += square[:-1, -1]
                 self.q[index] += square[-1, -1]
-            here, products = self._by_visit(rows, np.column_stack([at.by_joints[rows], whole]))
-            self.M[:, here], self.t[:, here] = products[..., :joints], products[..., -1]
+            visit, products = self._by_visit(rows, np.column_stack([at.by_joints[rows], whole]))
+            self.M[:, visit], self.t[:, visit] = products[..., :joints], products[..., -1]
             if fits:
-                kept.append((here, np.ascontiguousarray(products[..., joints:-1])))
-        self._kept = kept if fits else None
+                stored.append((visit, np.ascontiguousarray(products[..., joints:-1])))
+        self._stored = stored if fits else None
 
     def _by_visit(self, rows: Rows, every: Array) -> tuple[NDArray[np.intp], Array]:
         """Return visits, and products of their equations with the derivatives by the joints, by factor."""
@@ -268,8 +268,8 @@ class Moments:
         visits, factor, factors = at.visits.of(rows), at.factor[rows], len(self.q)
         products = np.empty((factors, visits.count, joints, every.shape[1]))
         for index in range(factors):
-            mine = every if factors == 1 else np.where((factor == index)[:, None], every, 0.0)
-            products[index] = visits.products(mine[:, :joints], mine)
+            of_factor = every if factors == 1 else np.where((factor == index)[:, None], every, 0.0)
+            products[index] = visits.products(of_factor[:, :joints], of_factor)
         return np.unique(at.visits.of_row[rows]), products
 
     def parts(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
@@ -279,16 +279,16 @@ class Moments:
         """
         most = max(1, _AT_ONCE // max(1, self.t.shape[2] * len(self.known)))
         joints = self.at.by_joints.shape[1]
-        found = self._kept
-        if found is None:
+        stored = self._stored
+        if stored is None:
             by_joints = self.at.by_joints
             for rows, Q, _ in self.at.turned():
-                here, products = self._by_visit(rows, np.column_stack([by_joints[rows], Q]))
-                yield here, products[..., joints:]
+                visit, products = self._by_visit(rows, np.column_stack([by_joints[rows], Q]))
+                yield visit, products[..., joints:]
             return
-        for here, T in found:
-            for first in range(0, len(here), most):
-                yield here[first : first + most], T[:, first : first + most]
+        for visit, T in stored:
+            for first in range(0, len(visit), most):
+                yield visit[first : first + most], T[:, first : first + most]
 
 
 def _root(information: Array) -> Array:
@@ -318,15 +318,15 @@ class Likelihood:
         self.E = np.swapaxes(half, 1, 2) @ half
         whole, b = np.tensordot(by, of.C, 1), by @ of.c
         seen = (self.E @ self.t[..., None])[..., 0]
-        for mine, _, T in self._parts():
-            HT = half[mine] @ T
+        for visit, _, T in self._parts():
+            HT = half[visit] @ T
             whole -= _product(HT, HT)
-            b -= _moved(T, seen[mine])
+            b -= _moved(T, seen[visit])
         self.whole = whole
         self._by_joints: dict[tuple[int, ...], tuple[Array, Array]] = {}
         self.L = _root(whole + of.known)
-        self.found = np.linalg.solve(self.L.T, np.linalg.solve(self.L, b))
-        left = float(by @ of.q - np.einsum("ak,akl,al->", self.t, self.E, self.t) - b @ self.found)
+        self.estimate = np.linalg.solve(self.L.T, np.linalg.solve(self.L, b))
+        left = float(by @ of.q - np.einsum("ak,akl,al->", self.t, self.E, self.t) - b @ self.estimate)
         logs = float(of.rows @ np.log(factors)) + 2.0 * float(np.linalg.slogdet(factor)[1].sum())
         self.likelihood = -0.5 * (logs + 2.0 * float(np.log(np.abs(np.diag(self.L))).sum()) + left)
 
@@ -336,8 +336,8 @@ class Likelihood:
         There is nothing to go through where no joint has a variance, unless it is asked for.
         """
         if always or self.joints.any():
-            for mine, by_factor in self.of.parts():
-                yield mine, by_factor, np.tensordot(1.0 / self.factors, by_factor, 1)
+            for visit, by_factor in self.of.parts():
+                yield visit, by_factor, np.tensordot(1.0 / self.factors, by_factor, 1)
 
     @cached_property
     def inverse(self) -> Array:
@@ -349,8 +349,8 @@ class Likelihood:
     def _seen(self) -> Array:
         """What the parameters explain of the products of each visit, ``(factors, visits, joints)``."""
         seen = np.empty_like(self.of.t)
-        for mine, by_factor in self.of.parts():
-            seen[:, mine] = (by_factor.reshape(-1, len(self.found)) @ self.found).reshape(by_factor.shape[:-1])
+        for visit, by_factor in self.of.parts():
+            seen[:, visit] = (by_factor.reshape(-1, len(self.estimate)) @ self.estimate).reshape(by_factor.shape[:-1])
         return seen
 
     @cached_property
@@ -365,28 +365,28 @@ class Likelihood:
         if not isinstance(kind, int):
             return self._of_joints(kind)[0]
         if len(self.factors) == 1:  # all of them, each times its variance, are the information
-            rest = self.whole
+            whole = self.whole
             for variance in np.unique(self.joints[self.joints > 0.0]).tolist():
-                rest = rest - variance * self.curvature(np.flatnonzero(self.joints == variance))
-            return np.asarray(rest / self.factors[0])
-        found = self.of.C[kind].copy()
-        for mine, by_factor, T in self._parts():
-            ET = self.E[mine] @ T
+                whole = whole - variance * self.curvature(np.flatnonzero(self.joints == variance))
+            return np.asarray(whole / self.factors[0])
+        curvature = self.of.C[kind].copy()
+        for visit, by_factor, T in self._parts():
+            ET = self.E[visit] @ T
             cross = _product(by_factor[kind], ET)
-            found += _product(ET, self.of.M[kind][mine] @ ET) - cross - cross.T
-        return np.asarray(found / self.factors[kind] ** 2)
+            curvature += _product(ET, self.of.M[kind][visit] @ ET) - cross - cross.T
+        return np.asarray(curvature / self.factors[kind] ** 2)
 
     def _of_joints(self, kind: NDArray[np.intp]) -> tuple[Array, Array]:
         """Return the curvature for a variance of joints, and ``A' V^-1 V_i P z``."""
         key = tuple(kind.tolist())
         if key not in self._by_joints:
             _, g, _, Lm = self._small
-            p = len(self.found)
+            p = len(self.estimate)
             curvature, shift = np.zeros((p, p)), np.zeros(p)
-            for mine, _, T in self._parts(always=True):
-                N = Lm[mine][:, kind] @ T
+            for visit, _, T in self._parts(always=True):
+                N = Lm[visit][:, kind] @ T
                 curvature += _product(N, N)
-                shift += _moved(N, g[mine][:, kind])
+                shift += _moved(N, g[visit][:, kind])
             self._by_joints[key] = curvature, shift
         return self._by_joints[key]
 
@@ -401,21 +401,24 @@ class Likelihood:
         of, count = self.of, len(kinds)
         e, g, LM, _ = self._small
         squares, traces = np.empty(count), np.empty(count)
-        shifts = np.empty((count, len(self.found)))  # A' V^-1 V_i P z
+        shifts = np.empty((count, len(self.estimate)))  # A' V^-1 V_i P z
         inner = np.empty((count, *g.shape))  # G' V^-1 V_i P z
         inside: dict[int, Array] = {}
         for i, kind in enumerate(kinds):
             if isinstance(kind, int):
                 v, seen = self.factors[kind], self._seen[kind]
                 h = (of.t[kind] - seen - (of.M[kind] @ e[..., None])[..., 0]) / v**2
-                r = float(of.q[kind] - 2.0 * of.c[kind] @ self.found + self.found @ of.C[kind] @ self.found) / v**2
+                r = (
+                    float(of.q[kind] - 2.0 * of.c[kind] @ self.estimate + self.estimate @ of.C[kind] @ self.estimate)
+                    / v**2
+                )
                 r -= float(np.sum(e * (h + (of.t[kind] - seen) / v**2)))
                 squares[i] = r
                 traces[i] = of.rows[kind] / v - float(np.sum(self.E * of.M[kind])) / v**2
-                shifts[i] = (of.c[kind] - of.C[kind] @ self.found) / v**2
+                shifts[i] = (of.c[kind] - of.C[kind] @ self.estimate) / v**2
                 pulled = (self.E @ h[..., None])[..., 0]
-                for mine, by_factor, T in self._parts():
-                    shifts[i] -= _moved(by_factor[kind], e[mine]) / v**2 + _moved(T, pulled[mine])
+                for visit, by_factor, T in self._parts():
+                    shifts[i] -= _moved(by_factor[kind], e[visit]) / v**2 + _moved(T, pulled[visit])
                 inner[i] = h - (self.M @ pulled[..., None])[..., 0]
                 inside[i] = h
             else:

@@ -140,8 +140,8 @@ def pulls(
         far = (norms / (_CAUCHY * scale)) ** 2
         along = np.maximum(1.0 - far, 0.0) / (1.0 + far) ** 2
     else:
-        one = components == 1
-        along = np.where(one, np.sqrt(2.0 / np.pi) / (_OF_ONE * scale), 0.0)
+        single = components == 1
+        along = np.where(single, np.sqrt(2.0 / np.pi) / (_OF_ONE * scale), 0.0)
     first = np.concatenate([[0], np.cumsum(components)[:-1]])
     length = np.sqrt(np.add.reduceat(residual**2, first))
     towards = residual / np.repeat(np.maximum(length, 1e-300), components)

@@ -16,7 +16,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.base.limits import limit, refuse_beyond
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS, Observation, Sighting, compared
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.robot.chain import Array, ForwardKinematics, together
 from truearm.engine.robot.parameters import (
     SCALE,
@@ -128,15 +128,17 @@ class Problem:
         visited = data.configuration
         if data.visit is not None:
             visited = np.unique(np.stack([visited, data.visit]), axis=1, return_inverse=True)[1].reshape(-1)
-        found, first = [], int(visited.max(initial=-1)) + 1
+        numbers, first = [], int(visited.max(initial=-1)) + 1
         for block in self.blocks:
             if block.data is data:
                 of_readings = visited[block.readings]
             else:
                 of_readings = first + np.arange(len(block.readings))
                 first += len(block.readings)
-            found.append(np.repeat(of_readings, block.observation.components))
-        return np.unique(np.concatenate(found), return_inverse=True)[1].reshape(-1) if found else np.zeros(0, np.intp)
+            numbers.append(np.repeat(of_readings, block.observation.components))
+        return (
+            np.unique(np.concatenate(numbers), return_inverse=True)[1].reshape(-1) if numbers else np.zeros(0, np.intp)
+        )
 
     @cached_property
     def portions(self) -> tuple[tuple[Rows, Problem], ...]:
@@ -162,11 +164,11 @@ class Problem:
         for block, place in self.placed:
             if block.data is self.data:
                 at = self.data.configuration[block.readings]
-                mine = np.flatnonzero((at >= first) & (at < end))
+                readings = np.flatnonzero((at >= first) & (at < end))
             else:
-                mine = np.arange(len(block.readings) if first == 0 else 0)
+                readings = np.arange(len(block.readings) if first == 0 else 0)
             size = block.observation.components
-            rows.append((place.start + size * mine[:, None] + np.arange(size)).reshape(-1))
+            rows.append((place.start + size * readings[:, None] + np.arange(size)).reshape(-1))
         return np.concatenate(rows), part
 
     def at(self, vector: Array) -> Evaluation:
@@ -179,8 +181,8 @@ class Problem:
 
     def linearised(self, vector: Array) -> tuple[Array, Array]:
         """Return the whitened residual ``(rows,)`` of the readings and its Jacobian ``(rows, parameters)``."""
-        here = self.at(vector)
-        return here.residual, here.jacobian
+        evaluation = self.at(vector)
+        return evaluation.residual, evaluation.jacobian
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Return the residual of the priors and the diagonal of its Jacobian, both ``(parameters,)``; zero without."""
@@ -247,11 +249,11 @@ class Evaluation:
 
         With fewer equations than parameters it has as many rows as equations.
         """
-        found = np.zeros((0, len(self.problem.free.names)))
+        triangle = np.zeros((0, len(self.problem.free.names)))
         for _, part in self.portions():
-            rows = part.jacobian if not len(found) else np.concatenate([part.jacobian, found])
-            found = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
-        return found
+            rows = part.jacobian if not len(triangle) else np.concatenate([part.jacobian, triangle])
+            triangle = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+        return triangle
 
     @cached_property
     def by_joints(self) -> Array:
@@ -459,27 +461,30 @@ class Linearisable(Protocol):
         """Return the whitened residual ``(rows,)`` at a vector and its Jacobian ``(rows, parameters)``."""
 
 
-def find_redundancies(problem: Linearisable, vector: Array, held: Sequence[str] = ()) -> tuple[Redundancy, ...]:
+def find_redundancies(problem: Linearisable, vector: Array, fixed: Sequence[str] = ()) -> tuple[Redundancy, ...]:
     """Return the redundant parameters of a problem at `vector`, with their combinations.
 
     Args:
-        held: Parameters that are redundant elsewhere. If as many are redundant here, these stay the ones that are held.
+        fixed: Parameters that are redundant elsewhere. If as many are redundant here, these stay fixed.
     """
     A = _columns(problem, vector)
     names = problem.free.names
-    kept = independent_columns(A, range(len(names)), problem.free)
-    dropped = [i for i in _in_order(problem.free) if i not in kept]
-    if held:
-        rest = [i for i, name in enumerate(names) if name not in held]
-        if len(kept) == len(rest) == len(independent_columns(A, rest, problem.free)):
-            kept, dropped = rest, [names.index(name) for name in held]
+    independent = independent_columns(A, range(len(names)), problem.free)
+    dropped = [i for i in _in_order(problem.free) if i not in independent]
+    if fixed:
+        others = [i for i, name in enumerate(names) if name not in fixed]
+        if len(independent) == len(others) == len(independent_columns(A, others, problem.free)):
+            independent, dropped = others, [names.index(name) for name in fixed]
     if not dropped:
         return ()
     # The direction bends: a parameter may take part only away from `vector`, so one prior along it is looked at too.
-    here = _combinations(A, dropped, kept)
-    along = vector + problem.free.prior * here.sum(axis=0)
-    away = _combinations(_columns(problem, along), dropped, kept)
-    return tuple(_redundancy(problem.free, i, at, there) for i, at, there in zip(dropped, here, away, strict=True))
+    combinations = _combinations(A, dropped, independent)
+    along = vector + problem.free.prior * combinations.sum(axis=0)
+    away = _combinations(_columns(problem, along), dropped, independent)
+    return tuple(
+        _redundancy(problem.free, i, at, elsewhere)
+        for i, at, elsewhere in zip(dropped, combinations, away, strict=True)
+    )
 
 
 def _columns(problem: Linearisable, vector: Array) -> Array:
@@ -505,33 +510,35 @@ def independent_columns(A: Array, among: Iterable[int], free: FreeParameters) ->
     norms = np.linalg.norm(A, axis=0)
     left = [i for i in _in_order(free) if i in set(among) and norms[i] > 1e-12 * norms.max()]
     rests = {i: A[:, i].copy() for i in left}
-    kept: list[int] = []
+    independent: list[int] = []
     for apart in _INDEPENDENT_SHARES:
         for i in list(left):
             size = float(np.linalg.norm(rests[i]))
             if size <= max(apart * norms[i], _LEAST_INFORMATION):
                 continue
             direction = rests[i] / size
-            kept.append(i)
+            independent.append(i)
             left.remove(i)
             for k in left:  # twice, against rounding
                 rests[k] -= direction * (direction @ rests[k])
                 rests[k] -= direction * (direction @ rests[k])
-    return kept
+    return independent
 
 
-def _combinations(A: Array, dropped: Sequence[int], kept: Sequence[int]) -> Array:
+def _combinations(A: Array, dropped: Sequence[int], independent: Sequence[int]) -> Array:
     """Return the directions, in priors, that move each dropped parameter by one and change no reading."""
     directions = np.zeros((len(dropped), A.shape[1]))
     directions[np.arange(len(dropped)), list(dropped)] = 1.0
-    directions[:, list(kept)] = -np.linalg.lstsq(A[:, list(kept)], A[:, list(dropped)], rcond=None)[0].T
+    directions[:, list(independent)] = -np.linalg.lstsq(A[:, list(independent)], A[:, list(dropped)], rcond=None)[0].T
     return directions
 
 
-def _redundancy(free: FreeParameters, dropped: int, here: Array, away: Array) -> Redundancy:
+def _redundancy(free: FreeParameters, dropped: int, combination: Array, away: Array) -> Redundancy:
     involved = [dropped]
-    involved += [i for i in range(len(here)) if i != dropped and max(abs(here[i]), abs(away[i])) > _LEAST_MEMBER]
-    members = {free.names[i]: float(here[i] * free.prior[i] / free.prior[dropped]) for i in involved}
+    involved += [
+        i for i in range(len(combination)) if i != dropped and max(abs(combination[i]), abs(away[i])) > _LEAST_MEMBER
+    ]
+    members = {free.names[i]: float(combination[i] * free.prior[i] / free.prior[dropped]) for i in involved}
     return Redundancy(free.names[dropped], members, in_words(members, free))
 
 
@@ -560,7 +567,7 @@ def in_words(members: dict[str, float], free: FreeParameters) -> str:
 
 
 def unobservable_parameters(
-    robot: Robot, data: Dataset, free: FreeParameters, seed: int = 0, held: Held = NOTHING_HELD
+    robot: Robot, data: Dataset, free: FreeParameters, seed: int = 0, fixed: FixedPlaces = NOTHING_FIXED
 ) -> tuple[str, ...]:
     """Return parameters in directions that the data do not observe although poses elsewhere depend on them.
 
@@ -573,7 +580,7 @@ def unobservable_parameters(
 
     Args:
         free: The parameters to look at; all others are held.
-        held: Places that are known. A fixture among them locates the robot.
+        fixed: Places that are known. A fixture among them locates the robot.
     """
     free = free.without([SCALE])  # as much as is known of it beforehand is enough
     if not free.names:
@@ -584,7 +591,7 @@ def unobservable_parameters(
     unobserved = Vt[int((s > _UNOBSERVED * s[0]).sum()) :]
     if len(unobserved) == 0:
         return ()
-    gauge = gauge_freedoms(data, held)
+    gauge = gauge_freedoms(data, fixed)
     q = robot.loaded(robot.random_configurations(40, np.random.default_rng(seed)))
     effects = np.zeros((0, len(free.names)))
     for target in robot.targets:
@@ -607,18 +614,18 @@ def unobservable_parameters(
     return tuple(name for name, is_in in zip(free.names, involved.tolist(), strict=True) if is_in)
 
 
-def gauge_freedoms(data: Dataset, held: Held = NOTHING_HELD) -> tuple[str, ...]:
+def gauge_freedoms(data: Dataset, fixed: FixedPlaces = NOTHING_FIXED) -> tuple[str, ...]:
     """Return the motions of everything that no reading observes: of the ``base``, and a change of ``size``."""
-    if data.anchored or held.locates(data):
+    if data.anchored or fixed.locates(data):
         return ()
     if data.distance is not None or (data.setup is not None and data.setup.distance is not None):
         return ("base",)
-    if any(any(place.translation) for place in held.targets.values()):  # it is a length on the flange
+    if any(any(place.translation) for place in fixed.targets.values()):  # it is a length on the flange
         return ("base",)
     for fixture in range(len(data.fixtures)):
         lengths = data.position if data.height is None else np.column_stack([data.position, data.height])
-        mine = lengths[data.against == fixture]
-        if any(len(np.unique(column[np.isfinite(column)])) > 1 for column in mine.T):
+        of_fixture = lengths[data.against == fixture]
+        if any(len(np.unique(column[np.isfinite(column)])) > 1 for column in of_fixture.T):
             return ("base",)
     return "base", "size"
 

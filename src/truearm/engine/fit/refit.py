@@ -75,15 +75,15 @@ def refit(robot: Robot, data: Dataset, moved: Moved) -> Refit:
         InputError: If the readings are too few to find it and to judge it.
     """
     data = _comparable(robot, data)
-    here = _referenced(robot.marked(data.simulated))
-    placed = _start(here, data, moved)
+    referenced = _referenced(robot.marked(data.simulated))
+    placed = _start(referenced, data, moved)
     noise = {observation.name: 1e-4 for observation in OBSERVATIONS}
     for _ in range(_NOISE_ROUNDS):
-        placed, found = _solved(placed, data, moved, noise)
-        noise = _noise_of(found, noise)
-    left = _left_without_each(found)
-    errors = _errors_of(found.problem, left, data)
-    old, new = _places(here), _places(placed)
+        placed, linear = _solved(placed, data, moved, noise)
+        noise = _noise_of(linear, noise)
+    left = _left_without_each(linear)
+    errors = _errors_of(linear.problem, left, data)
+    old, new = _places(referenced), _places(placed)
     read = [data.targets[t] for t in np.unique(data.target[data.has_reading]).tolist()]
     shifts: dict[str, float] = {}
     if moved == "tool":
@@ -94,8 +94,8 @@ def refit(robot: Robot, data: Dataset, moved: Moved) -> Refit:
         shifts = {name: float(np.linalg.norm(_point(new[name]) - _point(old[name]))) for name in read}
         shift, turn = max(shifts.values()), None
     else:
-        shift, turn, shifts = _base_motion(here, placed, data)
-    return Refit(moved, placed, errors, int(found.basis.shape[1]), int(data.has_reading.sum()), shift, turn, shifts)
+        shift, turn, shifts = _base_motion(referenced, placed, data)
+    return Refit(moved, placed, errors, int(linear.basis.shape[1]), int(data.has_reading.sum()), shift, turn, shifts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +159,10 @@ def _free(robot: Robot, data: Dataset, moved: Moved) -> FreeParameters:
 def _tool_motion(robot: Robot, free: FreeParameters) -> Array:
     """Return how the targets' parameters follow a shift and a turn of all of them about their middle, ``(k, 6)``."""
     places, at = _places(robot), {name: i for i, name in enumerate(free.names)}
-    mine = [target for target in robot.targets if target.parameter("x") in at]
-    middle = np.mean([_point(places[target.name]) for target in mine], axis=0)
+    targets = [target for target in robot.targets if target.parameter("x") in at]
+    middle = np.mean([_point(places[target.name]) for target in targets], axis=0)
     T = np.zeros((len(free.names), 6))
-    for target in mine:
+    for target in targets:
         rows = [at[target.parameter(axis)] for axis in "xyz"]
         T[rows, :3] = np.eye(3)
         x, y, z = _point(places[target.name]) - middle
@@ -178,8 +178,8 @@ def _stepped(robot: Robot, free: FreeParameters, step: Array, moved: Moved) -> R
     if moved != "tool":
         return _referenced(robot.with_values(free.values(free.start + step)))  # type: ignore[arg-type]
     places, names = _places(robot), set(free.names)
-    mine = [target.name for target in robot.targets if target.parameter("x") in names]
-    middle = np.mean([_point(places[name]) for name in mine], axis=0)
+    moved_targets = [target.name for target in robot.targets if target.parameter("x") in names]
+    middle = np.mean([_point(places[name]) for name in moved_targets], axis=0)
     R = rotation_from_vector(step[3:])
     return robot.with_frames(robot.base, _turned(places, R, middle + step[:3] - R @ middle))
 
@@ -202,8 +202,8 @@ def _start(robot: Robot, data: Dataset, moved: Moved) -> Robot:
             places = np.array([robot.world_poses(data.postures, name)[0] for name in data.targets])
             R, p = rigid_motion(places[data.target, data.configuration][read], data.position[read])
             base = robot.base
-            there = Transform.from_matrix(R @ base.rotation, R @ np.array(base.translation) + p)
-            robot = robot.with_frames(there, _places(robot))
+            moved_base = Transform.from_matrix(R @ base.rotation, R @ np.array(base.translation) + p)
+            robot = robot.with_frames(moved_base, _places(robot))
         return with_fixtures_of(robot, data)
     if not read.any():
         return robot
@@ -244,12 +244,12 @@ def _start(robot: Robot, data: Dataset, moved: Moved) -> Robot:
 
 def _seen_orientations(data: Dataset, flange: Array) -> dict[str, Array]:
     """Return the orientation of each target on the flange at the first reading that has one, ``(3, 3)``."""
-    found: dict[str, Array] = {}
+    orientations: dict[str, Array] = {}
     for i in np.flatnonzero(data.has_orientation).tolist() if data.quaternion is not None else ():
         name = data.targets[data.target[i]]
-        if name not in found and data.quaternion is not None:
-            found[name] = flange[data.configuration[i]].T @ rotation_from_quaternion(data.quaternion[i])
-    return found
+        if name not in orientations and data.quaternion is not None:
+            orientations[name] = flange[data.configuration[i]].T @ rotation_from_quaternion(data.quaternion[i])
+    return orientations
 
 
 def _apart_from_a_line(points: Array) -> bool:
@@ -257,15 +257,15 @@ def _apart_from_a_line(points: Array) -> bool:
     return bool(spread[1] > 0.05 * spread[0])
 
 
-def _noise_of(found: _Linear, noise: dict[str, float]) -> dict[str, float]:
+def _noise_of(linear: _Linear, noise: dict[str, float]) -> dict[str, float]:
     """Return the deviations of readings that declare none, from what is left of them."""
-    rows, seen = len(found.residual), dict(noise)
-    correction = rows / max(rows - found.basis.shape[1], 1)
+    rows, seen = len(linear.residual), dict(noise)
+    correction = rows / max(rows - linear.basis.shape[1], 1)
     first = 0
     squares: dict[str, list[Array]] = {}
-    for block in found.problem.blocks:
+    for block in linear.problem.blocks:
         if not block.declared:
-            squares.setdefault(block.observation.name, []).append(found.residual[first : first + block.rows] ** 2)
+            squares.setdefault(block.observation.name, []).append(linear.residual[first : first + block.rows] ** 2)
         first += block.rows
     for name, parts in squares.items():
         factor = float(np.sqrt(correction * np.mean(np.concatenate(parts))))
@@ -273,9 +273,9 @@ def _noise_of(found: _Linear, noise: dict[str, float]) -> dict[str, float]:
     return seen
 
 
-def _left_without_each(found: _Linear) -> Array:
+def _left_without_each(linear: _Linear) -> Array:
     """Return the whitened residual of each configuration by what is found without it, ``(rows,)``."""
-    problem, data, left = found.problem, found.problem.data, found.residual.copy()
+    problem, data, left = linear.problem, linear.problem.data, linear.residual.copy()
     of_row = np.concatenate(
         [
             np.repeat(data.configuration[b.readings], b.observation.components)
@@ -285,9 +285,9 @@ def _left_without_each(found: _Linear) -> Array:
         ]
     )
     for c in np.unique(of_row[of_row >= 0]).tolist():
-        mine = np.flatnonzero(of_row == c)
-        U = found.basis[mine]
-        strength, turns = np.linalg.eigh(np.eye(len(mine)) - U @ U.T)
+        rows = np.flatnonzero(of_row == c)
+        U = linear.basis[rows]
+        strength, turns = np.linalg.eigh(np.eye(len(rows)) - U @ U.T)
         if strength[0] < _LEAST_LEFT:
             raise InputError(
                 "the readings are too few, or their configurations too much alike, to find what moved and to judge it",
@@ -295,7 +295,7 @@ def _left_without_each(found: _Linear) -> Array:
                 came=f"configuration {data.labels[c]} decides alone",
                 cure="Measure more configurations.",
             )
-        left[mine] = turns @ ((turns.T @ found.residual[mine]) / strength)
+        left[rows] = turns @ ((turns.T @ linear.residual[rows]) / strength)
     return left
 
 
@@ -322,8 +322,8 @@ def _base_motion(old: Robot, new: Robot, data: Dataset) -> tuple[float, float | 
         R = new.base.rotation @ old.base.rotation.T
         places = np.array([old.world_poses(data.postures, name)[0] for name in data.targets])
         middle = places[data.target, data.configuration][data.has_reading].mean(axis=0)
-        there = R @ (middle - np.array(old.base.translation)) + np.array(new.base.translation)
-        return float(np.linalg.norm(there - middle)), _angle(R), {}
+        moved_middle = R @ (middle - np.array(old.base.translation)) + np.array(new.base.translation)
+        return float(np.linalg.norm(moved_middle - middle)), _angle(R), {}
     shifts = {}
     for name in data.fixtures:
         before, after = (robot.fixture_kinematics(name).position[:, 0] for robot in (old, new))
@@ -355,14 +355,14 @@ def _referenced(robot: Robot) -> Robot:
 
 def _places(robot: Robot) -> Places:
     """Return where each target is on the flange."""
-    found: Places = {}
+    places: Places = {}
     for target in robot.targets:
         at = target.chain.forward_kinematics(np.zeros((0, 1)), robot.values)
         point = at.position[:, 0]
-        found[target.name] = (
+        places[target.name] = (
             _triple(point) if target.quaternion is None else Transform.from_matrix(at.matrix()[0], point)
         )
-    return found
+    return places
 
 
 def _point(place: Transform | tuple[float, float, float]) -> Array:

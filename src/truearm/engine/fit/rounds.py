@@ -17,7 +17,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.fit.bounds import Bounds, bound_vectors
 from truearm.engine.fit.curves import NO_CURVES, Curves, with_stiffness
-from truearm.engine.fit.held import NOTHING_HELD, Held
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.likelihood import Linearised, Visits, WhitenedProblem, Whitening
 from truearm.engine.fit.losses import Loss, norms_of, scale_of, weighed_together
 from truearm.engine.fit.models import Model
@@ -75,7 +75,7 @@ class Solved:
     limits: tuple[Array, Array] | None
     #: Variances of the readings and of the joints' errors at the solution; None for losses other than the linear one.
     components: Components | None
-    held: Held = NOTHING_HELD  #: Places that were known.
+    fixed: FixedPlaces = NOTHING_FIXED  #: Places that were known.
     curves: Curves = NO_CURVES  #: The curves of the joints, where the model has them.
 
     @property
@@ -94,7 +94,7 @@ def find_parameters(
     redundancy: Redundant = "prior",
     bounds: Bounds | None = None,
     bounds_file: str = "bounds",
-    held: Held = NOTHING_HELD,
+    fixed: FixedPlaces = NOTHING_FIXED,
     small: float = SMALL,
     shared: bool = True,
     near: Solved | None = None,
@@ -109,12 +109,12 @@ def find_parameters(
             variances. What is found does not depend on it.
     """
     robot = robot.marked(data.simulated)
-    start = start_from_readings(model.prepared(robot), data, held) if near is None else near.start
+    start = start_from_readings(model.prepared(robot), data, fixed) if near is None else near.start
     check_circumstances(start, data)
-    free = held.free_of(unanchored(model.free(start), data), start)
+    free = fixed.free_of(unanchored(model.free(start), data), start)
     if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
         free = free.without([SCALE])
-    check_bounds = _checked(model, start, free, data.source, redundancy, held, bounds, bounds_file)
+    check_bounds = _checked(model, start, free, data.source, redundancy, fixed, bounds, bounds_file)
     problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
     joints = None
     if near is not None:
@@ -129,19 +129,21 @@ def find_parameters(
         out = [r.dropped for r in dropped]
         if check_bounds is not None:
             _check_dropped(out, free, check_bounds, bounds_file)
-        kept = problem.free.without(out)
-        limits = None if check_bounds is None else _limits_of(check_bounds, free, kept)
+        retained = problem.free.without(out)
+        limits = None if check_bounds is None else _limits_of(check_bounds, free, retained)
         solution, reduced, components, curves = _solve_with_noise(
-            replace(problem, free=kept), loss, limits, small, shared=shared and redundancy != "none", joints=joints
+            replace(problem, free=retained), loss, limits, small, shared=shared and redundancy != "none", joints=joints
         )
         steps += solution.steps
         if redundancy != "drop":
             break
         # What is redundant at the nominal robot need not be at the real one: look again there.
-        found = dict(zip(kept.names, solution.vector, strict=True))
-        there = FreeParameters(tuple(replace(p, value=float(found.get(p.name, p.nominal))) for p in free.parameters))
-        problem = replace(problem, free=there, noise=reduced.noise)
-        dropped = find_redundancies(problem, there.start, out)
+        values = dict(zip(retained.names, solution.vector, strict=True))
+        at_solution = FreeParameters(
+            tuple(replace(p, value=float(values.get(p.name, p.nominal))) for p in free.parameters)
+        )
+        problem = replace(problem, free=at_solution, noise=reduced.noise)
+        dropped = find_redundancies(problem, at_solution.start, out)
         if [r.dropped for r in dropped] == out:
             break
     else:
@@ -149,10 +151,10 @@ def find_parameters(
         dropped = tuple(r for r in dropped if r.dropped in out)
     if limits is not None and check_bounds is not None:
         limits = _limits_of(check_bounds, free, reduced.free)
-    if reduced.priors and "size" in gauge_freedoms(data, held):
+    if reduced.priors and "size" in gauge_freedoms(data, fixed):
         solution = _not_shrunk(reduced, solution, limits)
     start = start.with_parameters(curves.priors_of(start))
-    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, held, curves)
+    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, fixed, curves)
 
 
 def _checked(
@@ -161,7 +163,7 @@ def _checked(
     free: FreeParameters,
     source: str,
     redundancy: Redundant,
-    held: Held,
+    fixed: FixedPlaces,
     bounds: Bounds | None,
     bounds_file: str,
 ) -> tuple[Array, Array] | None:
@@ -186,7 +188,7 @@ def _checked(
     limits = None
     if bounds is not None:
         for name in (*bounds.within, *bounds.between):
-            if name in held.names(start):
+            if name in fixed.names(start):
                 raise InputError(
                     "the parameter has bounds, and it is held",
                     parameter="bounds",
@@ -196,7 +198,7 @@ def _checked(
                 )
         tried = start.with_effects(model.tried).parameters.values()
         limits = bound_vectors(bounds, free, bounds_file, tried)
-    if redundancy == "none" and bounds is None and not held:
+    if redundancy == "none" and bounds is None and not fixed:
         raise InputError(
             "without priors, bounds and places that are held nothing tells base and joints apart",
             parameter="redundancy",
@@ -216,11 +218,11 @@ def _not_shrunk(problem: Problem, solution: Solution, limits: tuple[Array, Array
     ``1 / sqrt(2 n)``, that the priors alone decide. They do along all directions of which the readings say nothing but
     what is in proportion to the residuals.
     """
-    prior, here = problem.free.prior, evaluated(problem, solution)
+    prior, evaluation = problem.free.prior, evaluated(problem, solution)
     is_length = np.concatenate([np.full(b.rows, b.observation.unit == "m") for b in problem.blocks])
-    residual = np.where(is_length, here.residual, 0.0)
+    residual = np.where(is_length, evaluation.residual, 0.0)
     triangle = np.zeros((0, len(prior) + 1))
-    for rows, part in here.portions():
+    for rows, part in evaluation.portions():
         both = np.column_stack([part.jacobian * prior, residual[rows]])
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, both]), mode="r"), dtype=np.float64)
     A, r = triangle[:, :-1], triangle[:, -1]
@@ -234,9 +236,9 @@ def _not_shrunk(problem: Problem, solution: Solution, limits: tuple[Array, Array
 def _begun_at(problem: Problem, near: Solved) -> Problem:
     """Return a problem that begins at the values and the noise of a solution."""
     known = dict(zip(near.problem.free.names, map(float, near.solution.vector), strict=True))
-    there = {name: value for name, value in known.items() if name in problem.free.names}
-    started = FreeParameters(tuple(replace(p, value=there.get(p.name, p.value)) for p in problem.free.parameters))
-    return replace(problem, robot=problem.robot.with_values(there), free=started, noise=near.problem.noise)
+    values = {name: value for name, value in known.items() if name in problem.free.names}
+    started = FreeParameters(tuple(replace(p, value=values.get(p.name, p.value)) for p in problem.free.parameters))
+    return replace(problem, robot=problem.robot.with_values(values), free=started, noise=near.problem.noise)
 
 
 def in_the_middle(robot: Robot, data: Dataset) -> Robot:
@@ -256,8 +258,8 @@ def _check_dropped(dropped: list[str], free: FreeParameters, limits: tuple[Array
             )
 
 
-def _limits_of(limits: tuple[Array, Array], free: FreeParameters, kept: FreeParameters) -> tuple[Array, Array]:
-    places = [free.names.index(name) for name in kept.names]
+def _limits_of(limits: tuple[Array, Array], free: FreeParameters, retained: FreeParameters) -> tuple[Array, Array]:
+    places = [free.names.index(name) for name in retained.names]
     return limits[0][places], limits[1][places]
 
 
@@ -280,27 +282,31 @@ def _solve_with_noise(
     """
     untold: frozenset[str] = frozenset()
     while True:
-        found = _solve_in_rounds(problem, loss, limits, small, shared=shared, joints=joints, untold=untold)
-        more = _untold(found[1], found[2]) - untold
+        result = _solve_in_rounds(problem, loss, limits, small, shared=shared, joints=joints, untold=untold)
+        more = _untold(result[1], result[2]) - untold
         if not more:
-            return found
+            return result
         untold |= more
 
 
-def _untold(problem: Problem, found: Components | None) -> frozenset[str]:
+def _untold(problem: Problem, components: Components | None) -> frozenset[str]:
     """Return what estimated variances are counted under that the readings do not tell.
 
     Of declared deviations it is no estimate that would make them smaller.
     """
-    if found is None:
+    if components is None:
         return frozenset()
     names, _ = factors_of(problem)
-    told = [
+    determined = [
         problem.widened**2 * factor >= 1.0 if name == DECLARED else freedom >= _FEWEST_LEFT
-        for name, factor, freedom in zip(names, found.weighing.factors.tolist(), found.freedom.tolist(), strict=True)
+        for name, factor, freedom in zip(
+            names, components.weighing.factors.tolist(), components.freedom.tolist(), strict=True
+        )
     ]
     return frozenset(
-        name for name, estimated, is_told in zip(names, found.estimated, told, strict=True) if estimated and not is_told
+        name
+        for name, estimated, is_determined in zip(names, components.estimated, determined, strict=True)
+        if estimated and not is_determined
     )
 
 
@@ -326,30 +332,30 @@ def _solve_in_rounds(
     components = None
     for _ in range(_ROUNDS + (curves.rounds if curves else 0)):
         if loss == "linear" and shared:
-            components = components_found(problem, solution, limits, components, untold)
-            there, change, joints = _with_components(problem, components, joints)
+            components = estimated_components(problem, solution, limits, components, untold)
+            next_problem, change, joints = _with_components(problem, components, joints)
         else:
-            there, change = _with_scale(problem, solution, loss)
-        found = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
-        started = FreeParameters(tuple(replace(p, value=found[p.name]) for p in problem.free.parameters))
-        there = replace(there, robot=problem.robot.with_values(found), free=started)
+            next_problem, change = _with_scale(problem, solution, loss)
+        values = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
+        started = FreeParameters(tuple(replace(p, value=values[p.name]) for p in problem.free.parameters))
+        next_problem = replace(next_problem, robot=problem.robot.with_values(values), free=started)
         if curves.rounds:
-            there, curves, joints = with_stiffness(there, every.free, curves, joints, solution.weight)
-            limits, change = _within(within, every.free, there.free), np.inf
-        if change < _SETTLED and _load_shift(problem, there) < _LOADS_AGREE * small:
+            next_problem, curves, joints = with_stiffness(next_problem, every.free, curves, joints, solution.weight)
+            limits, change = _within(within, every.free, next_problem.free), np.inf
+        if change < _SETTLED and _load_shift(problem, next_problem) < _LOADS_AGREE * small:
             break
-        if len(there.free.names) > len(problem.free.names):
+        if len(next_problem.free.names) > len(problem.free.names):
             components = None  # with curves it is asked again whether the joints err
-        problem = there
+        problem = next_problem
         solution = solve_with_joints(problem, joints, loss, limits, small, curves.design_effect)
         steps += solution.steps
     return replace(solution, steps=steps), problem, components, curves
 
 
 def _within(
-    limits: tuple[Array, Array] | None, free: FreeParameters, kept: FreeParameters
+    limits: tuple[Array, Array] | None, free: FreeParameters, retained: FreeParameters
 ) -> tuple[Array, Array] | None:
-    return None if limits is None else _limits_of(limits, free, kept)
+    return None if limits is None else _limits_of(limits, free, retained)
 
 
 def solve_with_joints(
@@ -383,7 +389,7 @@ def evaluated(problem: Problem, solution: Solution) -> Evaluation:
     return solution.at if isinstance(solution.at, Evaluation) else problem.at(solution.vector)
 
 
-def components_found(
+def estimated_components(
     problem: Problem,
     solution: Solution,
     limits: tuple[Array, Array] | None,
@@ -398,18 +404,18 @@ def components_found(
     names, of_row = factors_of(problem)
     uncertain = ~bound_by(solution, problem.free, limits)
     prior = problem.free.prior
-    here = evaluated(problem, solution)
+    evaluation = evaluated(problem, solution)
     at = Linearised(
         residual=solution.residual,
         by_parameters=lambda: (
-            (rows, part.jacobian[:, uncertain] * prior[uncertain]) for rows, part in here.portions()
+            (rows, part.jacobian[:, uncertain] * prior[uncertain]) for rows, part in evaluation.portions()
         ),
-        by_joints=here.by_joints,
+        by_joints=evaluation.by_joints,
         offset=((solution.vector - problem.free.nominal) / prior)[uncertain],
         priors=problem.priors,
         visits=Visits(problem.visits),
         factor=of_row,
-        triangle=here.triangle[:, uncertain] * prior[uncertain],
+        triangle=evaluation.triangle[:, uncertain] * prior[uncertain],
     )
     kinds = np.array([joint.kind for joint in problem.robot.joints])
     alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
@@ -451,33 +457,33 @@ def bound_by(solution: Solution, free: FreeParameters, limits: tuple[Array, Arra
     return np.asarray((solution.vector <= limits[0] + near) | (solution.vector >= limits[1] - near))
 
 
-def _with_components(problem: Problem, found: Components, joints: Array) -> tuple[Problem, float, Array]:
+def _with_components(problem: Problem, components: Components, joints: Array) -> tuple[Problem, float, Array]:
     """Return the problem with the deviations found, how much these changed, and the variances of the joints' errors."""
     names, _ = factors_of(problem)
     noise, widened = dict(problem.noise), problem.widened
-    for name, factor in zip(names, found.weighing.factors.tolist(), strict=True):
+    for name, factor in zip(names, components.weighing.factors.tolist(), strict=True):
         if name == DECLARED:
             widened = max(1.0, widened * factor**0.5)
         elif name != SETUP:
             noise[name] = max(noise[name] * factor**0.5, _NOISE_FLOOR)
-    there = replace(problem, noise=noise, widened=widened)
-    before, after = np.sqrt(joints), np.sqrt(found.weighing.joints)
+    next_problem = replace(problem, noise=noise, widened=widened)
+    before, after = np.sqrt(joints), np.sqrt(components.weighing.joints)
     change = float(np.max(np.abs(after - before) / np.maximum(np.maximum(after, before), 1e-300), initial=0.0))
-    return there, max(change, _noise_change(problem, there)), found.weighing.joints
+    return next_problem, max(change, _noise_change(problem, next_problem)), components.weighing.joints
 
 
 def _with_scale(problem: Problem, solution: Solution, loss: Loss) -> tuple[Problem, float]:
     """Return the problem with the robust deviations of the residuals, and how much these changed."""
     undeclared = {problem.kind(b) for b in problem.blocks if not b.declared}
     noise = dict(problem.noise)
-    found = noise_found(problem, solution, loss)
-    known = {name: found[name] for name in found if name not in undeclared}
+    estimates = estimated_noise(problem, solution, loss)
+    known = {name: estimates[name] for name in estimates if name not in undeclared}
     wider = excess_of(known) if known and not problem.data.anchored else 1.0
-    for name, (estimate, _) in found.items():
+    for name, (estimate, _) in estimates.items():
         if name in undeclared:
             noise[name] = max(estimate * noise[name], _NOISE_FLOOR)
-    there = replace(problem, noise=noise, widened=problem.widened * wider)
-    return there, _noise_change(problem, there)
+    next_problem = replace(problem, noise=noise, widened=problem.widened * wider)
+    return next_problem, _noise_change(problem, next_problem)
 
 
 def _noise_change(before: Problem, after: Problem) -> float:
@@ -495,28 +501,28 @@ def _load_shift(before: Problem, after: Problem) -> float:
     return float(np.abs(moved).max())
 
 
-def noise_found(problem: Problem, solution: Solution, loss: Loss) -> dict[str, tuple[float, float]]:
+def estimated_noise(problem: Problem, solution: Solution, loss: Loss) -> dict[str, tuple[float, float]]:
     """Return for each observation the deviation of its whitened residuals, and the degrees of freedom behind it."""
     kinds = np.concatenate([[problem.kind(b)] * b.rows for b in problem.blocks])
     components = weighed_together(loss, problem.components)
     of_norms = kinds[np.cumsum(components) - 1]
     norms = norms_of(solution.residual, components)
     spent = informed_rows(problem, solution)
-    found = {}
+    estimates = {}
     for name in dict.fromkeys(kinds.tolist()):
         if name == SETUP:
             continue
-        mine = solution.residual[kinds == name]
-        freedom = len(mine) * max(1.0 - spent / problem.rows, 1e-3)
+        of_kind = solution.residual[kinds == name]
+        freedom = len(of_kind) * max(1.0 - spent / problem.rows, 1e-3)
         if loss == "linear":
-            found[name] = (float(np.sqrt(np.sum(mine**2) / freedom)), freedom)
+            estimates[name] = (float(np.sqrt(np.sum(of_kind**2) / freedom)), freedom)
         else:
             of_name = of_norms == name
             scale = scale_of(loss, norms[of_name], components[of_name], spent * float(of_name.mean()))
             if spent > _LARGEST_SHARE_SPENT * problem.rows:
                 scale = max(scale, 1.0)  # nearly all are met whatever the noise: it stays as it was assumed
-            found[name] = (scale, freedom)
-    return found
+            estimates[name] = (scale, freedom)
+    return estimates
 
 
 def assumed_noise(problem: Problem, components: Components | None, spent: float) -> tuple[str, ...]:
@@ -528,8 +534,8 @@ def assumed_noise(problem: Problem, components: Components | None, spent: float)
     names, _ = factors_of(problem)
     undeclared = [name for name in names if name not in (DECLARED, SETUP)]
     if components is not None:
-        told = dict(zip(names, components.estimated, strict=True))
-        return tuple(name for name in undeclared if not told[name])
+        estimated = dict(zip(names, components.estimated, strict=True))
+        return tuple(name for name in undeclared if not estimated[name])
     met = spent > _LARGEST_SHARE_SPENT * problem.rows
     return tuple(name for name in undeclared if met and problem.noise[name] == _FIRST_NOISE[name])
 

@@ -48,27 +48,29 @@ def least_absolute(problem: Solvable, bounds: tuple[Array, Array] | None = None)
     low, high = bounds if bounds is not None else (np.full(len(problem.free.names), side) for side in (-np.inf, np.inf))
     x, longest = np.clip(problem.free.start, low, high), np.inf
     prior = problem.free.prior
-    here = problem.at(x)
+    current = problem.at(x)
     converged, steps = False, 0
     while not converged and steps < _STEPS:
         steps += 1
-        cost = float(np.abs(here.residual).sum())
-        room = np.stack([np.maximum((low - x) / prior, -longest), np.minimum((high - x) / prior, longest)], axis=1)
-        step, promised = _linear_program(here.jacobian * prior, here.residual, room)
+        cost = float(np.abs(current.residual).sum())
+        step_limits = np.stack(
+            [np.maximum((low - x) / prior, -longest), np.minimum((high - x) / prior, longest)], axis=1
+        )
+        step, promised = _linear_program(current.jacobian * prior, current.residual, step_limits)
         converged = cost - promised <= _LEAST_PROMISE * cost
         if converged:
             break
         trial = problem.at(np.clip(x + step * prior, low, high))
         if float(np.abs(trial.residual).sum()) < cost:
-            x, here = trial.vector, trial
+            x, current = trial.vector, trial
             longest = 2 * longest
         else:
             longest = 0.25 * float(np.abs(step).max())
             converged = longest < _SMALLEST
-    return here, converged, steps
+    return current, converged, steps
 
 
-def _linear_program(A: Array, r: Array, room: Array) -> tuple[Array, float]:
+def _linear_program(A: Array, r: Array, step_limits: Array) -> tuple[Array, float]:
     """Return the step within its room ``(parameters, 2)`` that is best where `A` holds, and the sum it promises."""
     from scipy.optimize import linprog
     from scipy.sparse import coo_array
@@ -78,7 +80,7 @@ def _linear_program(A: Array, r: Array, room: Array) -> tuple[Array, float]:
     row = np.concatenate([np.repeat(twice, count), twice])
     column = np.concatenate([np.tile(np.arange(count), 2 * rows), count + twice % rows])
     entries = np.concatenate([A.ravel(), -A.ravel(), -np.ones(2 * rows)])
-    limits: list[tuple[float, float]] = [(a, b) for a, b in room.tolist()]
+    limits: list[tuple[float, float]] = [(a, b) for a, b in step_limits.tolist()]
     both_sides: Any = coo_array((entries, (row, column)), shape=(2 * rows, count + rows)).tocsc()
     solution = linprog(
         np.concatenate([np.zeros(count), np.ones(rows)]),
@@ -207,22 +209,25 @@ def solve(
     if loss == "l1-components" and not problem.priors:
         return _by_linear_programs(problem, bounds)
     start = problem.free.start
-    here = problem.at(start if bounds is None else np.clip(start, *bounds))
+    current = problem.at(start if bounds is None else np.clip(start, *bounds))
     prior = problem.free.prior
     damping = 0.0
     scale: float | None = None
     components = weighed_together(loss, problem.components)
     steps, converged, size = 0, False, np.inf
     for steps in range(1, _STEPS_SOLVER[loss] + 1):
-        norms = _norms(here, loss)
+        norms = _norms(current, loss)
         scale = _next_scale(loss, norms, components, scale, steps)
         w = None if loss == "linear" else np.repeat(weights(loss, norms, scale), components)
-        R, c = _triangle(here, w)
-        cost = _cost(here, w)
+        R, c = _triangle(current, w)
+        cost = _cost(current, w)
         accepted = False
         for _ in range(25):
-            step = _step(R * prior, c, damping, _room(here.vector, bounds, prior), full_rank=problem.priors) * prior
-            trial = problem.at(here.vector + step)
+            step = (
+                _step(R * prior, c, damping, _step_limits(current.vector, bounds, prior), full_rank=problem.priors)
+                * prior
+            )
+            trial = problem.at(current.vector + step)
             gain = cost - _cost(trial, w)
             predicted = float(c @ c) - float(np.sum((R @ step + c) ** 2))
             accepted = gain >= 0.0 or predicted <= 1e-13 * cost
@@ -232,29 +237,29 @@ def solve(
             damping = max(10 * damping, 1e-6 * float(np.sum((R * prior) ** 2)) / len(prior))
         if not accepted:
             break
-        here = trial
-        step_taken(problem, here.vector, cost - gain)
+        current = trial
+        step_taken(problem, current.vector, cost - gain)
         before, size = size, float(np.abs(step / np.minimum(prior, _GEOMETRIC)).max())
         last = size < small * (_CREEPING_FACTOR if loss in ABSOLUTE else 1.0)
         if loss == "linear" and damping == 0.0 and bounds is None and size < before < np.inf:
             last = last or size / before * size < _SURELY * small  # what the next step would be, at most
         ended = last or predicted <= (_CREEPING if loss == "l1-components" else 1e-24) * max(cost, 1.0)
         if ended:
-            converged = loss not in ABSOLUTE or scale <= _L1_FLOOR * float(np.median(_norms(here, loss)) + 1e-300)
+            converged = loss not in ABSOLUTE or scale <= _L1_FLOOR * float(np.median(_norms(current, loss)) + 1e-300)
             if converged:
                 break
-    final = weights(loss, _norms(here, loss), scale or 1.0)
+    final = weights(loss, _norms(current, loss), scale or 1.0)
     if loss == "l1-components":
         final = _of_readings(final, problem.components)
-    return Solution(here.vector, converged, steps, here, final)
+    return Solution(current.vector, converged, steps, current, final)
 
 
 def _by_linear_programs(problem: Solvable, bounds: tuple[Array, Array] | None) -> Solution:
     """Minimise the sum of absolute coordinates without priors: a vertex, which reweighting does not reach."""
-    here, converged, steps = least_absolute(problem, bounds)
-    norms = _norms(here, "l1-components")
+    current, converged, steps = least_absolute(problem, bounds)
+    norms = _norms(current, "l1-components")
     weight = weights("l1-components", norms, 0.3 * _L1_FLOOR * float(np.median(norms)) + 1e-300)
-    return Solution(here.vector, converged, steps, here, _of_readings(weight, problem.components))
+    return Solution(current.vector, converged, steps, current, _of_readings(weight, problem.components))
 
 
 def _of_readings(weight: Array, components: NDArray[np.intp]) -> Array:
@@ -277,29 +282,29 @@ def _next_scale(loss: Loss, norms: Array, components: NDArray[np.intp], scale: f
     return scale
 
 
-def _norms(here: Evaluated, loss: Loss) -> Array:
+def _norms(evaluation: Evaluated, loss: Loss) -> Array:
     """Return the norm of each whitened reading; ones for the linear loss, which does not ask."""
-    components = weighed_together(loss, here.problem.components)
-    return np.ones(len(components)) if loss == "linear" else norms_of(here.residual, components)
+    components = weighed_together(loss, evaluation.problem.components)
+    return np.ones(len(components)) if loss == "linear" else norms_of(evaluation.residual, components)
 
 
-def _cost(here: Evaluated, w: Array | None) -> float:
-    prior, _ = here.problem.prior_rows(here.vector)
-    squares = here.residual**2
+def _cost(evaluation: Evaluated, w: Array | None) -> float:
+    prior, _ = evaluation.problem.prior_rows(evaluation.vector)
+    squares = evaluation.residual**2
     return float(np.sum(squares if w is None else w * squares)) + float(prior @ prior)
 
 
-def _triangle(here: Evaluated, w: Array | None) -> tuple[Array, Array]:
+def _triangle(evaluation: Evaluated, w: Array | None) -> tuple[Array, Array]:
     """Return R and c with |R s + c|^2 equal to the linearised cost of a step s, up to a constant.
 
     Args:
         w: Weight of every row's square, ``(rows,)``; None for ones.
     """
-    triangle: Array = np.zeros((0, len(here.vector) + 1))
-    if here.problem.priors:
-        prior, weight = here.problem.prior_rows(here.vector)
+    triangle: Array = np.zeros((0, len(evaluation.vector) + 1))
+    if evaluation.problem.priors:
+        prior, weight = evaluation.problem.prior_rows(evaluation.vector)
         triangle = np.column_stack([np.diag(weight), prior])
-    for rows, part in parts_of(here):
+    for rows, part in parts_of(evaluation):
         J, r = part.jacobian, part.residual
         stacked = np.empty((J.shape[1] + 1, len(J) + len(triangle)))  # column by column, as QR takes it
         stacked[:-1, : len(J)], stacked[-1, : len(J)] = J.T, r
@@ -310,34 +315,34 @@ def _triangle(here: Evaluated, w: Array | None) -> tuple[Array, Array]:
     return triangle[:, :-1], triangle[:, -1]
 
 
-def parts_of(here: Evaluated) -> Iterable[tuple[Rows, Evaluated]]:
+def parts_of(evaluation: Evaluated) -> Iterable[tuple[Rows, Evaluated]]:
     """Return the parts in which the derivatives of an evaluated problem are found, each with its equations."""
-    portions = getattr(here, "portions", None)
-    return ((slice(None), here),) if portions is None else portions()
+    portions = getattr(evaluation, "portions", None)
+    return ((slice(None), evaluation),) if portions is None else portions()
 
 
-def _room(x: Array, bounds: tuple[Array, Array] | None, prior: Array) -> tuple[Array, Array] | None:
+def _step_limits(x: Array, bounds: tuple[Array, Array] | None, prior: Array) -> tuple[Array, Array] | None:
     if bounds is None:
         return None
     return (bounds[0] - x) / prior, (bounds[1] - x) / prior
 
 
-def _step(A: Array, c: Array, damping: float, room: tuple[Array, Array] | None, *, full_rank: bool) -> Array:
+def _step(A: Array, c: Array, damping: float, limits: tuple[Array, Array] | None, *, full_rank: bool) -> Array:
     """Minimise |A s + c|^2 + damping |s|^2, within `room` if there are bounds."""
-    if room is not None:
+    if limits is not None:
         from scipy.optimize import lsq_linear
 
-        low, high = room
-        held = high - low < 1e-15
-        low, high = np.where(held, -1e-15, np.minimum(low, 0.0)), np.where(held, 1e-15, np.maximum(high, 0.0))
+        low, high = limits
+        fixed = high - low < 1e-15
+        low, high = np.where(fixed, -1e-15, np.minimum(low, 0.0)), np.where(fixed, 1e-15, np.maximum(high, 0.0))
         damped = np.concatenate([A, np.sqrt(damping + 1e-24) * np.eye(A.shape[1])])
         target = np.concatenate([-c, np.zeros(A.shape[1])])
         result = lsq_linear(damped, target, bounds=(low, high), method="bvls", tol=1e-14, max_iter=400)
-        return np.asarray(np.clip(result.x, *room))
+        return np.asarray(np.clip(result.x, *limits))
     if full_rank and damping == 0.0:
         size = A.shape[1]  # the row below is zero: what no step can change
         return np.asarray(-np.linalg.solve(A[:size], c[:size]))
     U, s, Vt = np.linalg.svd(A, full_matrices=False)
-    kept = s > 1e-14 * s[0]
-    factor = np.where(kept, s / np.where(kept, s**2 + damping, 1.0), 0.0)
+    significant = s > 1e-14 * s[0]
+    factor = np.where(significant, s / np.where(significant, s**2 + damping, 1.0), 0.0)
     return np.asarray(-Vt.T @ (factor * (U.T @ c)))

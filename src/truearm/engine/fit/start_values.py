@@ -18,8 +18,8 @@ import numpy as np
 from truearm.engine.base.errors import InputError, nearest_names
 from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.observations import OBSERVATIONS
+from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.frames import initial_frames
-from truearm.engine.fit.held import NOTHING_HELD, Held
 from truearm.engine.fit.problem import Problem
 from truearm.engine.fit.solver import solve
 from truearm.engine.robot.chain import Array
@@ -126,7 +126,7 @@ Place = tuple[FixtureKind, Transform]
 _SEARCH_REACH: Final = 0.45
 _SEARCH_STEP: Final = 0.09
 #: How many of the places tried are gone on from.
-_PLACES_KEPT: Final = 6
+_MOST_PLACES: Final = 6
 #: Deviation that readings are weighed with while targets are looked for [m or rad].
 _SEARCH_DEVIATION: Final = 1e-3
 #: Step that is the last there, in priors; what is found is a start.
@@ -141,29 +141,29 @@ _ALIKE: Final = 0.8
 _LEAST_SINGULAR_VALUE: Final = 1e-5
 
 
-def start_from_readings(robot: Robot, data: Dataset, held: Held = NOTHING_HELD) -> Robot:
+def start_from_readings(robot: Robot, data: Dataset, fixed: FixedPlaces = NOTHING_FIXED) -> Robot:
     """Return the robot placed where the data say it stands, with the data's targets and fixtures.
 
     Args:
         robot: Its kinematic parameters are used as they are. Its own base and targets are left out of account where the
             data place them.
-        held: Places that are known: the robot, its targets and the fixtures are there.
+        fixed: Places that are known: the robot, its targets and the fixtures are there.
 
     Raises:
         InputError: If readings contradict each other about what a fixture is, or are too few or too much alike to place
             target and fixture.
     """
     if data.fixture is None:
-        return initial_frames(robot, data, held).with_scale(data.scale_sigma)
+        return initial_frames(robot, data, fixed).with_scale(data.scale_sigma)
     kinds = _kinds(data)
-    _refuse_few(data, kinds, held)
-    placed = _placed(robot, data, kinds, held)
+    _refuse_few(data, kinds, fixed)
+    placed = _placed(robot, data, kinds, fixed)
     have = {target.name for target in placed.targets}
     for target in dict.fromkeys(data.target[data.has_reading & (data.against >= 0)].tolist()):
         if data.targets[target] not in have:
-            placed = _with_target(placed, data, target, kinds, held)
-    placed = placed.with_fixtures(_fixture_places(placed, data, kinds, held))
-    _refuse_alike(placed, data, held)
+            placed = _with_target(placed, data, target, kinds, fixed)
+    placed = placed.with_fixtures(_fixture_places(placed, data, kinds, fixed))
+    _refuse_alike(placed, data, fixed)
     return placed.with_scale(data.scale_sigma)
 
 
@@ -181,16 +181,16 @@ def unanchored(free: FreeParameters, data: Dataset) -> FreeParameters:
 
 def _kinds(data: Dataset) -> dict[str, FixtureKind]:
     """Return what each fixture is, from what is measured against it."""
-    found: dict[str, FixtureKind] = {}
+    kinds: dict[str, FixtureKind] = {}
     for index, name in enumerate(data.fixtures):
-        mine = data.against == index
+        of_fixture = data.against == index
         seen: list[FixtureKind] = []
-        if data.height is not None and np.isfinite(data.height[mine]).any():
+        if data.height is not None and np.isfinite(data.height[of_fixture]).any():
             seen.append("plane")
-        if data.distance is not None and np.isfinite(data.distance[mine]).any():
+        if data.distance is not None and np.isfinite(data.distance[of_fixture]).any():
             seen.append("point")
-        counted = data.position[mine][np.isfinite(data.position[mine]).all(axis=1)]
-        turned = data.quaternion is not None and bool(np.isfinite(data.quaternion[mine]).any())
+        counted = data.position[of_fixture][np.isfinite(data.position[of_fixture]).all(axis=1)]
+        turned = data.quaternion is not None and bool(np.isfinite(data.quaternion[of_fixture]).any())
         if len(counted) or turned:
             seen.append("frame" if turned or np.ptp(counted, axis=0).any() else "point")
         if len(set(seen)) > 1:
@@ -201,39 +201,39 @@ def _kinds(data: Dataset) -> dict[str, FixtureKind]:
                 allowed="heights over a plane, distances from a point, or positions counted from a point or in a frame",
                 cure="Give them fixtures of different names.",
             )
-        found[name] = seen[0] if seen else "point"
+        kinds[name] = seen[0] if seen else "point"
     if data.setup is not None:
         apart = np.isfinite(data.setup.distance) if data.setup.distance is not None else np.zeros(0, dtype=bool)
         others = data.setup.against[apart] if len(apart) else np.zeros(0, dtype=np.intp)
         for name in dict.fromkeys((*data.setup.targets, *(data.fixtures[f] for f in others.tolist() if f >= 0))):
-            if found.setdefault(name, "point") == "plane":
+            if kinds.setdefault(name, "point") == "plane":
                 raise InputError(
                     "a plane has no place and no distance from another fixture",
                     where=f"{data.source}, fixture {name}",
                     allowed="heights over it, and nothing known of itself",
                     cure="Remove its row of the role fixture.",
                 )
-    return found
+    return kinds
 
 
-def _placed(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind], held: Held) -> Robot:
+def _placed(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind], fixed: FixedPlaces) -> Robot:
     """Return the robot with its base and with those targets that are known, or that positions give."""
     setup = data.setup
     if data.has_position.any():
-        placed = initial_frames(robot, data, held)
-    elif held.base is not None:
-        placed = robot.with_frames(held.base, {})
+        placed = initial_frames(robot, data, fixed)
+    elif fixed.base is not None:
+        placed = robot.with_frames(fixed.base, {})
     elif setup is not None and setup.has_position.any():
-        sides = [initial_frames(robot, seen, held) for seen in _triangulated(data, setup)]
-        placed = min(sides, key=lambda found: _misfit(found, data, setup))
+        sides = [initial_frames(robot, seen, fixed) for seen in _triangulated(data, setup)]
+        placed = min(sides, key=lambda candidate: _misfit(candidate, data, setup))
     else:
         placed = robot.with_frames(robot.base, {})
     for index, name in enumerate(data.fixtures):
         if kinds[name] == "frame":
-            seen = initial_frames(robot, _as_instrument(data, index), held.seen_from(name))
+            seen = initial_frames(robot, _as_instrument(data, index), fixed.seen_from(name))
             placed = _also(placed, {**_targets(seen), **_targets(placed)})
     have = {target.name for target in placed.targets}
-    known = {n: np.array(p.translation) for n, p in held.targets.items() if n in data.targets and n not in have}
+    known = {n: np.array(p.translation) for n, p in fixed.targets.items() if n in data.targets and n not in have}
     return _at_points(_also(placed, known) if known else placed, data, kinds)
 
 
@@ -263,13 +263,13 @@ def _triangulated(data: Dataset, setup: Dataset) -> Iterator[Dataset]:
         read = np.flatnonzero(np.isfinite(data.distance) & (data.against >= 0))
         lengths[data.configuration[read], data.target[read], data.against[read]] = data.distance[read]
     for side in (1.0, -1.0):
-        where, what, found = [], [], []
+        configurations, targets, points = [], [], []
         for c, t in np.argwhere((np.isfinite(lengths) & useful).sum(axis=2) >= 3).tolist():
             seen = np.isfinite(lengths[c, t]) & useful
-            where.append(c)
-            what.append(t)
-            found.append(point_at_distances(anchors[seen], lengths[c, t, seen], side))
-        if not found:
+            configurations.append(c)
+            targets.append(t)
+            points.append(point_at_distances(anchors[seen], lengths[c, t, seen], side))
+        if not points:
             raise InputError(
                 "no target was measured from enough known points",
                 where=data.source,
@@ -278,9 +278,9 @@ def _triangulated(data: Dataset, setup: Dataset) -> Iterator[Dataset]:
             )
         yield replace(
             data,
-            configuration=np.array(where, dtype=np.intp),
-            target=np.array(what, dtype=np.intp),
-            position=np.array(found),
+            configuration=np.array(configurations, dtype=np.intp),
+            target=np.array(targets, dtype=np.intp),
+            position=np.array(points),
             quaternion=None,
             distance=None,
             height=None,
@@ -310,61 +310,63 @@ def _at_points(robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind]) ->
         rows[k, :, 3 * (len(targets) + f) :][:, :3] = -np.eye(3)
     right = data.position[read] - p[data.configuration[read]]
     solved = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), right.reshape(-1), rcond=1e-6)[0]
-    found = {data.targets[t]: np.asarray(solved[3 * k : 3 * k + 3], float) for k, t in enumerate(targets)}
-    return _also(robot, found)
+    places = {data.targets[t]: np.asarray(solved[3 * k : 3 * k + 3], float) for k, t in enumerate(targets)}
+    return _also(robot, places)
 
 
-def _also(robot: Robot, found: Mapping[str, Transform | Array]) -> Robot:
+def _also(robot: Robot, places: Mapping[str, Transform | Array]) -> Robot:
     """Return the robot with some targets more."""
-    return robot.with_frames(robot.base, {**_targets(robot), **found})  # type: ignore[dict-item]
+    return robot.with_frames(robot.base, {**_targets(robot), **places})  # type: ignore[dict-item]
 
 
-def _with_target(robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind], held: Held) -> Robot:
+def _with_target(
+    robot: Robot, data: Dataset, target: int, kinds: Mapping[str, FixtureKind], fixed: FixedPlaces
+) -> Robot:
     """Return the robot with a target whose place follows from distances and heights alone."""
-    mine = data.of_readings(data.has_reading & (data.target == target) & (data.against >= 0))
-    mine = _some_of_each_fixture(mine)
-    touched = np.unique(mine.against)
-    mine = replace(
-        mine,
+    readings = data.of_readings(data.has_reading & (data.target == target) & (data.against >= 0))
+    readings = _some_of_each_fixture(readings)
+    touched = np.unique(readings.against)
+    readings = replace(
+        readings,
         fixtures=tuple(data.fixtures[f] for f in touched.tolist()),
-        fixture=np.searchsorted(touched, mine.against),
+        fixture=np.searchsorted(touched, readings.against),
         setup=None,
         sigma=None,
         sigma_rot=None,
     )
     name = data.targets[target]
-    p, R = robot.world_poses(mine.postures)
-    p, R = p[mine.configuration], R[mine.configuration]
+    p, R = robot.world_poses(readings.postures)
+    p, R = p[readings.configuration], R[readings.configuration]
     steps = np.arange(-_SEARCH_REACH, _SEARCH_REACH + 1e-9, _SEARCH_STEP)
     grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
     tips = p + np.einsum("nij,gj->gni", R, grid)
     cost = np.zeros(len(grid))
-    for index in range(len(mine.fixtures)):
-        of = mine.against == index
+    for index in range(len(readings.fixtures)):
+        of = readings.against == index
         points = tips[:, of]
-        if mine.distance is not None and np.isfinite(mine.distance[of]).any():
-            centre = centres_of(points, mine.distance[of])
-            off = np.linalg.norm(points - centre[:, None], axis=2) - mine.distance[of]
-        elif mine.height is not None and np.isfinite(mine.height[of]).any():
+        if readings.distance is not None and np.isfinite(readings.distance[of]).any():
+            centre = centres_of(points, readings.distance[of])
+            off = np.linalg.norm(points - centre[:, None], axis=2) - readings.distance[of]
+        elif readings.height is not None and np.isfinite(readings.height[of]).any():
             spread = points - points.mean(axis=1, keepdims=True)
-            h = mine.height[of] - mine.height[of].mean()
+            h = readings.height[of] - readings.height[of].mean()
             normal = normals_of(spread, h)
             off = np.einsum("gni,gi->gn", spread, normal) - h
         else:
             continue
         cost += np.sum(off**2, axis=1)
-    found = []
-    for start in np.argsort(cost)[:_PLACES_KEPT].tolist():
+    candidates = []
+    for start in np.argsort(cost)[:_MOST_PLACES].tolist():
         tried = _also(robot, {name: grid[start]})
-        tried = tried.with_fixtures(_fixture_places(tried, mine, kinds, held))
+        tried = tried.with_fixtures(_fixture_places(tried, readings, kinds, fixed))
         own = tried.target(name).chain.parameters
         free = FreeParameters(tuple(q for q in tried.parameters.values() if q.group == "fixture" or q.name in own))
-        free = free.without(Held(fixtures=held.fixtures).names(tried))
-        problem = Problem(tried, mine, free, dict.fromkeys(_names(), _SEARCH_DEVIATION))
+        free = free.without(FixedPlaces(fixtures=fixed.fixtures).names(tried))
+        problem = Problem(tried, readings, free, dict.fromkeys(_names(), _SEARCH_DEVIATION))
         solution = solve(problem, small=_SEARCH_SMALL)
-        there = solution.vector[[free.names.index(tried.target(name).parameter(axis)) for axis in "xyz"]]
-        found.append((float(solution.residual @ solution.residual), there))
-    return _also(robot, {name: min(found, key=lambda one: one[0])[1]})
+        point = solution.vector[[free.names.index(tried.target(name).parameter(axis)) for axis in "xyz"]]
+        candidates.append((float(solution.residual @ solution.residual), point))
+    return _also(robot, {name: min(candidates, key=lambda candidate: candidate[0])[1]})
 
 
 def _some_of_each_fixture(data: Dataset) -> Dataset:
@@ -374,21 +376,21 @@ def _some_of_each_fixture(data: Dataset) -> Dataset:
     fixtures = np.unique(data.against)
     some = np.zeros(len(data.target), dtype=bool)
     for fixture in fixtures.tolist():
-        mine = np.flatnonzero(data.against == fixture)
-        count = min(len(mine), max(_LEAST_OF_A_FIXTURE, _READINGS_USED // len(fixtures)))
-        some[mine[np.linspace(0, len(mine) - 1, count).astype(np.intp)]] = True
+        readings = np.flatnonzero(data.against == fixture)
+        count = min(len(readings), max(_LEAST_OF_A_FIXTURE, _READINGS_USED // len(fixtures)))
+        some[readings[np.linspace(0, len(readings) - 1, count).astype(np.intp)]] = True
     return data.of_readings(some)
 
 
-def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind], held: Held) -> None:
+def _refuse_few(data: Dataset, kinds: Mapping[str, FixtureKind], fixed: FixedPlaces) -> None:
     """Refuse fixtures that stand nowhere, for want of readings."""
-    known = {*held.fixtures, *({} if data.setup is None else _known(data.setup))}
+    known = {*fixed.fixtures, *({} if data.setup is None else _known(data.setup))}
     least = {"point": 4, "plane": 3, "frame": 1}
     for index, name in enumerate(data.fixtures):
-        mine = (data.against == index) & data.has_reading
-        held = np.isfinite(data.position[mine]).all(axis=1).any()
-        count = int(mine.sum())
-        if name not in known and count < (1 if held else least[kinds[name]]):
+        of_fixture = (data.against == index) & data.has_reading
+        has_position = np.isfinite(data.position[of_fixture]).all(axis=1).any()
+        count = int(of_fixture.sum())
+        if name not in known and count < (1 if has_position else least[kinds[name]]):
             near = nearest_names(name, [other for other in data.fixtures if _may_be(name, other)], 1, _ALIKE)
             raise InputError(
                 "a fixture was measured too few times to locate it",
@@ -411,7 +413,7 @@ def _may_be(name: str, other: str) -> bool:
 
 
 def _fixture_places(
-    robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind], held: Held = NOTHING_HELD
+    robot: Robot, data: Dataset, kinds: Mapping[str, FixtureKind], fixed: FixedPlaces = NOTHING_FIXED
 ) -> dict[str, Place]:
     """Return where the fixtures stand, from the places of the targets; known places as they are known."""
     at = robot.loaded(data.postures)
@@ -422,10 +424,10 @@ def _fixture_places(
     for index, name in enumerate(data.fixtures):
         read = np.flatnonzero((data.against == index) & data.has_reading)
         points = np.array([tips[data.targets[data.target[r]]][data.configuration[r]] for r in read.tolist()])
-        if name in held.fixtures:
-            place = held.fixtures[name]
+        if name in fixed.fixtures:
+            place = fixed.fixtures[name]
         elif kinds[name] == "frame":
-            place = _frame(robot, data, index, held)
+            place = _frame(robot, data, index, fixed)
             place = Transform(known[name], place.quaternion) if name in known else place
         elif name in known:
             place = Transform(known[name])
@@ -440,16 +442,16 @@ def _fixture_places(
 
 
 def _known(setup: Dataset) -> dict[str, tuple[float, float, float]]:
-    found = {}
+    points = {}
     for reading in np.flatnonzero(setup.has_position).tolist():
         x, y, z = setup.position[reading].tolist()
-        found[setup.targets[setup.target[reading]]] = (x, y, z)
-    return found
+        points[setup.targets[setup.target[reading]]] = (x, y, z)
+    return points
 
 
-def _frame(robot: Robot, data: Dataset, index: int, held: Held) -> Transform:
+def _frame(robot: Robot, data: Dataset, index: int, fixed: FixedPlaces) -> Transform:
     """Return where a frame stands: the robot's base, seen from it, the other way round."""
-    from_it = initial_frames(robot, _as_instrument(data, index), Held(targets=held.targets)).base
+    from_it = initial_frames(robot, _as_instrument(data, index), FixedPlaces(targets=fixed.targets)).base
     turned = robot.base.rotation @ from_it.rotation.T
     return Transform.from_matrix(turned, np.array(robot.base.translation) - turned @ np.array(from_it.translation))
 
@@ -475,10 +477,10 @@ def _misfit(robot: Robot, data: Dataset, setup: Dataset) -> float:
     off = 0.0
     for target in robot.targets:
         tips = robot.world_poses(data.postures, target.name)[0]
-        mine = data.target == data.targets.index(target.name)
+        of_target = data.target == data.targets.index(target.name)
         for index, name in enumerate(data.fixtures):
             if data.distance is not None and name in known:
-                read = mine & (data.against == index) & np.isfinite(data.distance)
+                read = of_target & (data.against == index) & np.isfinite(data.distance)
                 far = np.linalg.norm(tips[data.configuration[read]] - np.array(known[name]), axis=1)
                 off += float(np.sum((far - data.distance[read]) ** 2))
     return off
@@ -488,9 +490,9 @@ def _names() -> tuple[str, ...]:
     return tuple(observation.name for observation in OBSERVATIONS)
 
 
-def _refuse_alike(robot: Robot, data: Dataset, held: Held) -> None:
+def _refuse_alike(robot: Robot, data: Dataset, fixed: FixedPlaces) -> None:
     """Refuse readings that do not even determine where base, targets and fixtures are."""
-    free = held.free_of(_start_parameters(robot, data, ("base", "target", "fixture")), robot)
+    free = fixed.free_of(_start_parameters(robot, data, ("base", "target", "fixture")), robot)
     if not free.names:
         return
     noise = dict.fromkeys(_names(), _SEARCH_DEVIATION)

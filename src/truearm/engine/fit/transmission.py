@@ -89,15 +89,15 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
     pull, weight = np.zeros((len(at), count)), np.zeros((len(at), count, count))
     left, readings = np.zeros(len(at)), np.zeros(len(at))
     for index, name in enumerate(data.targets):
-        mine = np.flatnonzero((data.target == index) & data.has_position)
-        where = data.configuration[mine]
+        rows = np.flatnonzero((data.target == index) & data.has_position)
+        configuration = data.configuration[rows]
         kinematics = robot.forward_kinematics(at, name)
-        rate = kinematics.position_jacobian(robot.moving[:count])[..., where]
-        residual = data.position[mine].T - kinematics.position[:, where]
-        np.add.at(pull, where, np.einsum("jan,an->nj", rate, residual))
-        np.add.at(weight, where, np.einsum("jan,kan->njk", rate, rate))
-        np.add.at(left, where, (residual**2).sum(0))
-        np.add.at(readings, where, 1.0)
+        rate = kinematics.position_jacobian(robot.moving[:count])[..., configuration]
+        residual = data.position[rows].T - kinematics.position[:, configuration]
+        np.add.at(pull, configuration, np.einsum("jan,an->nj", rate, residual))
+        np.add.at(weight, configuration, np.einsum("jan,kan->njk", rate, rate))
+        np.add.at(left, configuration, (residual**2).sum(0))
+        np.add.at(readings, configuration, 1.0)
     free = 3 * int((readings > 0).sum()) - len(fit.free.names)
     return lines_of(robot, Pulls(at.joints, pull, weight, float(left.sum()), free))
 
@@ -116,7 +116,7 @@ def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[Periodic
     open_joints = [
         i for i, joint in enumerate(robot.joints) if joint.kind == "revolute" and joint.transmission_periods is None
     ]
-    found: list[PeriodicError] = []
+    errors: list[PeriodicError] = []
     while open_joints:
         noise = total / max(free, 1)
         tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise, fewest), i) for i in open_joints]
@@ -127,11 +127,11 @@ def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[Periodic
             break
         wave = a * np.sin(periods * q[:, joint]) + b * np.cos(periods * q[:, joint])
         aliases = _aliases(q[:, joint], wave, weight[:, joint, joint], periods)
-        found.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance, aliases))
+        errors.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance, aliases))
         pull -= weight[:, :, joint] * wave[:, None]
         total -= explained
         open_joints.remove(joint)
-    return tuple(sorted(found, key=lambda error: error.joint))
+    return tuple(sorted(errors, key=lambda error: error.joint))
 
 
 def _strongest(q: Array, pull: Array, weight: Array, noise: float, fewest: int) -> tuple[float, int, float, float]:
@@ -201,13 +201,13 @@ TRANSMISSION_ERROR: Final = Rule("transmission-error", "warning", "residuals rep
 
 def check_transmission(fit: Fit, data: Dataset) -> list[Notice]:
     """Return a notice if some joints err periodically."""
-    found = periodic_errors(fit, data)
-    if not found:
+    errors = periodic_errors(fit, data)
+    if not errors:
         return []
-    told = "; ".join(error.words for error in found)
+    words = "; ".join(error.words for error in errors)
     return [
         TRANSMISSION_ERROR(
-            f"What is left over repeats with the joints' angles: {told}. Strain wave gears do that, twice in a turn "
+            f"What is left over repeats with the joints' angles: {words}. Strain wave gears do that, twice in a turn "
             "of their wave generator. `model=auto` tries to take the error out; any other model does with the effect "
             "transmission-error, and transmission_periods of these joints in the robot file."
         )

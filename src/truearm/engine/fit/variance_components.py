@@ -226,8 +226,8 @@ def _covariance(
         for place, change in enumerate(changes)
     ]
     if state.of.at.priors:
-        rest = np.eye(len(inverse)) - sum(changes)
-        parts.append(CovariancePart(turned @ rest @ turned.T + unseen, np.inf))
+        unexplained = np.eye(len(inverse)) - sum(changes)
+        parts.append(CovariancePart(turned @ unexplained @ turned.T + unseen, np.inf))
     free = [changes[place] for place in known]
     return turned @ _widened(free, relative, len(inverse)) @ turned.T + unseen, tuple(parts)
 
@@ -280,7 +280,7 @@ def _agree(alone: Likelihood, best: Likelihood) -> bool:
     differ = values > _LEAST_DIFFERENCE
     if not differ.any():
         return True
-    apart = vectors[:, differ].T @ (best.L.T @ (alone.found - best.found)) / np.sqrt(values[differ])
+    apart = vectors[:, differ].T @ (best.L.T @ (alone.estimate - best.estimate)) / np.sqrt(values[differ])
     return not beyond_chance(float(apart @ apart), float(differ.sum()))
 
 
@@ -297,7 +297,7 @@ def _independent(state: Likelihood) -> bool:
     for rows, Q, z in at.turned():
         part = whitening.of(rows)
         X = np.asarray(np.linalg.solve(state.L, part.applied(Q / root[rows, None]).T).T, dtype=np.float64)
-        pulls = part.visits.products(X, part.applied((z - Q @ state.found) / root[rows])[:, None])
+        pulls = part.visits.products(X, part.applied((z - Q @ state.estimate) / root[rows])[:, None])
         squares += float(np.sum(pulls**2))
         for _, alike in part.visits.alike:
             few = X[alike]
@@ -322,18 +322,18 @@ def _maximised(
     moments: Moments, start: Likelihood, kinds: Sequence[NDArray[np.intp]], noise: Sequence[int]
 ) -> Likelihood:
     """Climb to the largest likelihood from some variances, all of them above zero."""
-    here, kinds = start, list(kinds)
+    current, kinds = start, list(kinds)
     size = _effect(moments)
     before: tuple[Array, Array] | None = None
     for _ in range(_STEPS):
         free: list[NDArray[np.intp] | int] = [*kinds, *noise]
         if not free:
             break
-        value = np.array([here.factors[i] if isinstance(i, int) else here.joints[i[0]] for i in free])
-        squares, traces, information = here.slopes(free)
+        value = np.array([current.factors[i] if isinstance(i, int) else current.joints[i[0]] for i in free])
+        squares, traces, information = current.slopes(free)
         slope = 0.5 * (squares - traces) * value
-        bent = information * np.outer(value, value)
-        step = np.linalg.solve(bent + 1e-9 * (1.0 + float(np.trace(bent))) * np.eye(len(free)), slope)
+        curvature = information * np.outer(value, value)
+        step = np.linalg.solve(curvature + 1e-9 * (1.0 + float(np.trace(curvature))) * np.eye(len(free)), slope)
         if float(slope @ step) < _SETTLED:
             break
         if before is not None:  # as much further as the last step fell short: the information is but an average
@@ -342,20 +342,20 @@ def _maximised(
             step *= _FURTHER if gain > max(0.0, _FURTHER * fall) else 0.3 if fall <= 0.0 else max(0.3, gain / fall)
         step *= min(1.0, _LARGEST_STEP / float(np.abs(step).max() + 1e-300))
         for _ in range(12):
-            there = _at(moments, here, free, value * np.exp(step))
-            if there.likelihood >= here.likelihood - 1e-9 * abs(here.likelihood):
+            trial = _at(moments, current, free, value * np.exp(step))
+            if trial.likelihood >= current.likelihood - 1e-9 * abs(current.likelihood):
                 break
             step *= 0.4
         else:
             break
-        here, before = there, (step, slope)
-        if any(here.joints[kind[0]] * size > _MOST * here.factors.max() for kind in kinds):
+        current, before = trial, (step, slope)
+        if any(current.joints[kind[0]] * size > _MOST * current.factors.max() for kind in kinds):
             break
-        gone = [kind for kind in kinds if here.joints[kind[0]] * size < _LEAST * here.factors.min()]
+        gone = [kind for kind in kinds if current.joints[kind[0]] * size < _LEAST * current.factors.min()]
         for kind in gone:
-            here, before = _at(moments, here, [kind], np.zeros(1)), None
+            current, before = _at(moments, current, [kind], np.zeros(1)), None
         kinds = [kind for kind in kinds if not any(kind is other for other in gone)]
-    return here
+    return current
 
 
 def _effect(moments: Moments) -> float:
@@ -363,9 +363,9 @@ def _effect(moments: Moments) -> float:
     return float(np.trace(moments.M.sum(axis=(0, 1))) / moments.rows.sum())
 
 
-def _at(moments: Moments, here: Likelihood, kinds: Sequence[NDArray[np.intp] | int], values: Array) -> Likelihood:
+def _at(moments: Moments, current: Likelihood, kinds: Sequence[NDArray[np.intp] | int], values: Array) -> Likelihood:
     """Return the state with some variances changed."""
-    factors, joints = here.factors.copy(), here.joints.copy()
+    factors, joints = current.factors.copy(), current.joints.copy()
     for kind, value in zip(kinds, values.tolist(), strict=True):
         if isinstance(kind, int):
             factors[kind] = value
@@ -409,7 +409,7 @@ _LARGEST_SHARE: Final = 0.999
 _INFORMED: Final = 0.5
 _LEAST_FREEDOM: Final = 1.0
 #: Numbers that are in memory at once, of the visits' shares and of their products.
-_KEPT: Final = 16_000_000
+_MOST_STORED: Final = 16_000_000
 
 
 # What parameters are uncertain by where no model of the residuals holds: from the scatter of the visits themselves.
@@ -440,8 +440,10 @@ def cluster_covariance(
             ``(parameters,)``; 1 with priors, 0 where nothing is known.
     """
     root = triangle = np.diag(beforehand[uncertain])
-    for _, told, _ in parts():
-        triangle = np.asarray(np.linalg.qr(np.concatenate([told[:, uncertain], triangle]), mode="r"), dtype=np.float64)
+    for _, sensitivity, _ in parts():
+        triangle = np.asarray(
+            np.linalg.qr(np.concatenate([sensitivity[:, uncertain], triangle]), mode="r"), dtype=np.float64
+        )
     _, s, Vt = np.linalg.svd(triangle, full_matrices=False)
     directions = Vt.T / np.maximum(s, 1e-12 * s[:1])
     along = root @ directions
@@ -449,8 +451,8 @@ def cluster_covariance(
     known = along.T @ along
     whole = CovariancePart(directions @ (widening(freedom) ** 2 * meat + known) @ directions.T, np.inf)
     scatter = CovariancePart(directions @ meat @ directions.T, freedom)
-    rest = CovariancePart(directions @ known @ directions.T, np.inf)
-    return whole.among(uncertain).covariance, (scatter.among(uncertain), rest.among(uncertain))
+    known_part = CovariancePart(directions @ known @ directions.T, np.inf)
+    return whole.among(uncertain).covariance, (scatter.among(uncertain), known_part.among(uncertain))
 
 
 @dataclass(frozen=True, eq=False)
@@ -468,21 +470,21 @@ class _Scatter:
         Each comes with its share of what is known: eigenvalues ``(k, m)``, their vectors ``(k, p, m)``, and its pull
         ``(k, p)``.
         """
-        return self._found() if self._kept is None else self._kept
+        return self._computed() if self._stored is None else self._stored
 
     @cached_property
-    def _kept(self) -> list[tuple[Array, Array, Array]] | None:
-        few = len(self.visits.of_row) * self.directions.shape[1] <= _KEPT
-        return list(self._found()) if few else None
+    def _stored(self) -> list[tuple[Array, Array, Array]] | None:
+        few = len(self.visits.of_row) * self.directions.shape[1] <= _MOST_STORED
+        return list(self._computed()) if few else None
 
-    def _found(self) -> Iterator[tuple[Array, Array, Array]]:
-        for rows, told, pull in self.parts():
+    def _computed(self) -> Iterator[tuple[Array, Array, Array]]:
+        for rows, sensitivity, pull in self.parts():
             visits = self.visits.of(rows)
-            X = told[:, self.uncertain] @ self.directions
+            X = sensitivity[:, self.uncertain] @ self.directions
             pulled = pull[:, self.uncertain] @ self.directions
             pulls = visits.products(pulled, np.ones((len(pull), 1)))[..., 0]
-            for mine, places in visits.alike:
-                yield *_eigen(X[places]), pulls[mine]
+            for visit, places in visits.alike:
+                yield *_eigen(X[places]), pulls[visit]
 
 
 def _eigen(part: Array) -> tuple[Array, Array]:
@@ -509,7 +511,7 @@ def _meat(scatter: _Scatter, known_before: bool) -> tuple[Array, float]:
     # Of each parameter, over the visits: variance of its shares, their squares, what they have in common.
     total, squares, mixed, spent = np.zeros((4, len(asked)))
     crossed = np.empty(len(asked))
-    at_once = max(1, _KEPT // count**2)
+    at_once = max(1, _MOST_STORED // count**2)
     for first in range(0, len(asked), at_once):
         some = slice(first, first + at_once)
         products = np.zeros((len(asked[some]), count, count))

@@ -57,7 +57,7 @@ def links_beside(robot: Robot) -> tuple[Beside, ...]:
     follows them and the centres of gravity of the links between, where the robot has masses, each :data:`BEYOND` times
     as far from the first origin.
     """
-    arm, found = at_the_origin(robot).rigid, []
+    arm, beside = at_the_origin(robot).rigid, []
     count = len(robot.joints)
     kinematics = arm.forward_kinematics(np.zeros((1, count)))
     moving = arm.moving[:count]
@@ -80,27 +80,27 @@ def links_beside(robot: Robot) -> tuple[Beside, ...]:
                 side = 1.0 if high >= -low else -1.0
                 low, high = sorted((side * low, side * high))
                 numbers = tuple(range(first + 1, last + 2))
-                found.append(Beside(numbers, low, high, tuple(side * at for at in origins[:-1]), side))
+                beside.append(Beside(numbers, low, high, tuple(side * at for at in origins[:-1]), side))
         first = last + 1
-    return tuple(found)
+    return tuple(beside)
 
 
-def _parallel(arm: Robot, axes: list[Array], one: int, other: int) -> bool:
-    turning = arm.joints[one].kind == arm.joints[other].kind == "revolute"
-    return turning and bool(np.linalg.norm(np.cross(axes[one], axes[other])) < _PARALLEL)
+def _parallel(arm: Robot, axes: list[Array], first: int, second: int) -> bool:
+    turning = arm.joints[first].kind == arm.joints[second].kind == "revolute"
+    return turning and bool(np.linalg.norm(np.cross(axes[first], axes[second])) < _PARALLEL)
 
 
 def _centres(arm: Robot) -> list[list[Array]]:
     """Return the centres of gravity of the link behind each joint [m], at joint positions zero, each ``(3,)``."""
     ends = [0, *accumulate(len(link) for link in arm.moved_links)]
     rigid = arm.arm.forward_kinematics(np.zeros((len(arm.joints), 1)), arm.values)
-    found: list[list[Array]] = [[] for _ in arm.joints]
+    centres: list[list[Array]] = [[] for _ in arm.joints]
     for link in arm.masses:
         if link.mass > 0.0 and link.joint < len(arm.joints):
             end = ends[link.joint]
             centre = rigid.origin(end).reshape(3) + rigid.matrix(end).reshape(3, 3) @ np.array(link.cog)
-            found[link.joint - 1].append(centre)
-    return found
+            centres[link.joint - 1].append(centre)
+    return centres
 
 
 LINKS_BESIDE: Final = Rule(

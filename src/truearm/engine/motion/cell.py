@@ -92,11 +92,11 @@ def skeleton(robot: Robot, q: Array | Postures) -> list[Array]:
     kinematics = robot.forward_kinematics(q)
     start = np.broadcast_to(np.array(robot.base.translation)[:, None], kinematics.position.shape)
     points = [start, *(kinematics.origin(i) for i in robot.moving[: len(robot.joints)]), kinematics.position]
-    kept = [points[0].T]
+    selected = [points[0].T]
     for point in points[1:]:
-        if np.linalg.norm(point.T - kept[-1], axis=1).max(initial=0.0) > _LENGTH:
-            kept.append(point.T)
-    return kept
+        if np.linalg.norm(point.T - selected[-1], axis=1).max(initial=0.0) > _LENGTH:
+            selected.append(point.T)
+    return selected
 
 
 def smallest_clearance(robot: Robot, q: Array | Postures, near: float) -> Array:
@@ -239,6 +239,6 @@ def refuse_floor_elsewhere(floor: float) -> None:
         )
 
 
-def boxes_of(given: Mapping[str, tuple[Array, Array]]) -> tuple[KeepOut, ...]:
+def boxes_of(corners: Mapping[str, tuple[Array, Array]]) -> tuple[KeepOut, ...]:
     """Return boxes by their names, with their lowest and highest corners [m]."""
-    return tuple(KeepOut(name, low, high) for name, (low, high) in given.items())
+    return tuple(KeepOut(name, low, high) for name, (low, high) in corners.items())

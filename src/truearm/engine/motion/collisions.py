@@ -1,8 +1,8 @@
-"""How much room an arm has: to the floor, to boxes, and between its own links; at postures and on ways between them.
+"""How far an arm is from what it may touch: the floor, boxes and its own links; at postures and on ways between them.
 
 A way is driven with all joints moving at once, each from one value to the other. It is looked at where it is needed:
 how fast the distance of two bodies changes at most follows from the lengths between the joints that move one against
-the other, so that two postures with much room answer for what lies between them (conservative advancement: Mirtich
+the other, so that two postures far from everything answer for what lies between them (conservative advancement: Mirtich
 1996, "Impulse-based dynamic simulation of rigid body systems").
 """
 
@@ -41,10 +41,10 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Room:
+class CollisionPair:
     """What is kept clear of what: the floor, a box, or another link."""
 
-    what: str  #: The floor, a box or the links: by what postures are rejected and distances are said.
+    thing: str  #: The floor, a box or the links: by what postures are rejected and distances are said.
     words: str  #: What comes near what.
     piece: Piece | None = None  #: piece, other: the link, and the other one of two; no link for the floor.
     other: Piece | None = None
@@ -54,54 +54,54 @@ class Room:
 
 
 class Measure:
-    """Measures rooms at points of an arm.
+    """Measures distances at points of an arm.
 
     Lines side by side stand for a plate, a point of which is not farther than the gap from one of them. So the plate is
     not nearer than the root of the squares of their distance less that of the gap: the shortest way to the inside of a
     plate is at right angles to it, and its sides are lines themselves.
     """
 
-    def __init__(self, rooms: Sequence[Room], cell: Cell) -> None:
-        self.cell, self.count = cell, len(rooms)
-        floor = [(k, room.point, room.radius) for k, room in enumerate(rooms) if room.piece is None]
+    def __init__(self, pairs: Sequence[CollisionPair], cell: Cell) -> None:
+        self.cell, self.count = cell, len(pairs)
+        floor = [(k, pair.point, pair.radius) for k, pair in enumerate(pairs) if pair.piece is None]
         self._floor = [np.array(column) for column in zip(*floor, strict=True)] if floor else None
         boxed: dict[int, list[int]] = {}
-        for k, room in enumerate(rooms):
-            if room.piece is not None and room.other is None:
-                boxed.setdefault(room.box, []).append(k)
+        for k, pair in enumerate(pairs):
+            if pair.piece is not None and pair.other is None:
+                boxed.setdefault(pair.box, []).append(k)
         self._boxes = {}
         for number, places in boxed.items():
-            pieces = [piece for piece in (rooms[k].piece for k in places) if piece is not None]
+            pieces = [piece for piece in (pairs[k].piece for k in places) if piece is not None]
             self._boxes[number] = _Lines(
                 places,
                 [[(line,) for line in piece.lines()] for piece in pieces],
                 [piece.capsule.gap for piece in pieces],
                 [piece.capsule.radius for piece in pieces],
             )
-        pairs = [(k, r.piece, r.other) for k, r in enumerate(rooms) if r.piece is not None and r.other is not None]
-        self._pairs = None
-        if pairs:
-            self._pairs = _Lines(
-                [k for k, _, _ in pairs],
-                [_between(one, other) for _, one, other in pairs],
-                [0.0 if _level(one, other) else one.capsule.gap + other.capsule.gap for _, one, other in pairs],
-                [one.capsule.radius + other.capsule.radius for _, one, other in pairs],
+        links = [(k, r.piece, r.other) for k, r in enumerate(pairs) if r.piece is not None and r.other is not None]
+        self._of_links = None
+        if links:
+            self._of_links = _Lines(
+                [k for k, _, _ in links],
+                [_between(piece, other) for _, piece, other in links],
+                [0.0 if _level(piece, other) else piece.capsule.gap + other.capsule.gap for _, piece, other in links],
+                [piece.capsule.radius + other.capsule.radius for _, piece, other in links],
             )
 
     def __call__(self, points: Array) -> Array:
-        """Return the rooms at points ``(points, 3, n)`` [m], ``(rooms, n)``; below zero they touch."""
-        found = np.empty((self.count, points.shape[2]))
+        """Return the distances at points ``(points, 3, n)`` [m], ``(pairs, n)``; below zero they touch."""
+        distances = np.empty((self.count, points.shape[2]))
         if self._floor is not None:
             rows, point, radius = self._floor
             assert self.cell.floor is not None
-            found[rows] = points[point, 2] - radius[:, None] - self.cell.floor
+            distances[rows] = points[point, 2] - radius[:, None] - self.cell.floor
         for number, lines in self._boxes.items():
             box = self.cell.boxes[number]
-            found[lines.rows] = lines.least(box_distance(*lines.ends(points, 0), box.low, box.high))
-        if self._pairs is not None:
-            lines = self._pairs
-            found[lines.rows] = lines.least(segment_distance(*lines.ends(points, 0), *lines.ends(points, 1)))
-        return found
+            distances[lines.rows] = lines.least(box_distance(*lines.ends(points, 0), box.low, box.high))
+        if self._of_links is not None:
+            lines = self._of_links
+            distances[lines.rows] = lines.least(segment_distance(*lines.ends(points, 0), *lines.ends(points, 1)))
+        return distances
 
 
 _Line = tuple[int, int, float, float]
@@ -131,22 +131,22 @@ class _Lines:
         return origin + first[:, None, None] * along, origin + last[:, None, None] * along
 
     def least(self, apart: Array) -> Array:
-        """Return the room by the distances of lines, ``(groups, n)``."""
+        """Return the distances of plates by those of lines, ``(groups, n)``."""
         nearest = np.minimum.reduceat(apart, self._first, axis=0)
         return np.asarray(np.sqrt(np.maximum(nearest**2 - self._square, 0.0)) - self._radius)
 
 
-def _level(one: Piece, other: Piece) -> bool:
+def _level(piece: Piece, other: Piece) -> bool:
     """Return whether plates lie along the same axes, so that they are as far apart as lines across these."""
-    a, b = one.capsule, other.capsule
+    a, b = piece.capsule, other.capsule
     return a.across is not None and b.across is not None and a.joints == b.joints
 
 
-def _between(one: Piece, other: Piece) -> list[tuple[_Line, ...]]:
-    a, b = one.capsule.across, other.capsule.across
-    if a is not None and b is not None and _level(one, other):
-        return [((*a, one.first, one.last), (*b, other.first, other.last))]
-    return [(a_line, b_line) for a_line in one.lines() for b_line in other.lines()]
+def _between(piece: Piece, other: Piece) -> list[tuple[_Line, ...]]:
+    a, b = piece.capsule.across, other.capsule.across
+    if a is not None and b is not None and _level(piece, other):
+        return [((*a, piece.first, piece.last), (*b, other.first, other.last))]
+    return [(a_line, b_line) for a_line in piece.lines() for b_line in other.lines()]
 
 
 LINKS: Final = "links"
@@ -168,7 +168,7 @@ class Checked:
     """Ways that were looked at."""
 
     clear: NDArray[np.bool_]  #: Whether the clearance is kept all the way, ``(n,)``.
-    room: Array  #: The smallest room that was found [m], ``(n,)``.
+    distance: Array  #: The smallest distance that was found [m], ``(n,)``.
     worst: NDArray[np.intp]  #: Number of what comes nearest, see :meth:`CollisionCheck.words`, ``(n,)``.
 
 
@@ -180,8 +180,8 @@ class CollisionCheck:
     as much of them that the way along the arm between the rest is :data:`APART` times what they keep, their radii and
     the clearance. What no posture keeps apart is left out.
 
-    Links between parallel axes are plates, wide enough to hold the link wherever along the axes it may lie: rooms to
-    them are never more than those to the link.
+    Links between parallel axes are plates, wide enough to hold the link wherever along the axes it may lie:
+    distances to them are never more than those to the link.
 
     Attributes:
         left_out: What no posture keeps apart, in words.
@@ -194,72 +194,72 @@ class CollisionCheck:
     def __init__(self, robot: Robot, cell: Cell) -> None:
         self.robot, self.cell, self.arm = robot, cell, ArmCapsules(robot)
         self.need = cell.clearance + MARGIN
-        self._refuse_held()
+        self._refuse_around_base()
         self._stubs: dict[str, None] = {}
         self.connected = 0.0
-        rooms = [*self._to_the_floor(), *self._to_the_boxes()]
+        pairs = [*self._to_the_floor(), *self._to_the_boxes()]
         between = self._between_links()
         ever = set(np.flatnonzero((Measure(between, cell)(self.arm.sampled) >= self.need).any(axis=1)).tolist())
-        self._rooms = [*rooms, *(room for k, room in enumerate(between) if k in ever)]
+        self._pairs = [*pairs, *(pair for k, pair in enumerate(between) if k in ever)]
         self.left_out = (
             *self._stubs,
-            *(room.words.removesuffix(_NEAR) for k, room in enumerate(between) if k not in ever),
+            *(pair.words.removesuffix(_NEAR) for k, pair in enumerate(between) if k not in ever),
         )
         self._measures: dict[str, Measure] = {}
 
     # -- at postures ---------------------------------------------------------------------------------------
 
-    def rooms(self, q: Array) -> Array:
-        """Return the room to everything at joint positions ``(n, joints)`` [m], ``(rooms, n)``; below zero they touch.
+    def distances(self, q: Array) -> Array:
+        """Return all distances at joint positions ``(n, joints)`` [m], ``(pairs, n)``; below zero they touch.
 
         Args:
             q: Of the model [rad or m].
         """
         parts = [self._measure(self.arm.points(part)) for part in _parts(q)]
-        return np.concatenate([np.zeros((len(self._rooms), 0)), *parts], axis=1)
+        return np.concatenate([np.zeros((len(self._pairs), 0)), *parts], axis=1)
 
-    def room(self, q: Array) -> Array:
-        """Return the smallest room at joint positions ``(n, joints)`` [m], ``(n,)``; infinite if nothing is near."""
-        return np.asarray(self.rooms(q).min(axis=0, initial=np.inf))
+    def smallest_distance(self, q: Array) -> Array:
+        """Return the smallest distance at joint positions ``(n, joints)`` [m], ``(n,)``; infinite if none is near."""
+        return np.asarray(self.distances(q).min(axis=0, initial=np.inf))
 
-    def kept(self, q: Array) -> dict[str, NDArray[np.bool_]]:
+    def clear_of(self, q: Array) -> dict[str, NDArray[np.bool_]]:
         """Return for the floor, each box and the links at which joint positions ``(n, joints)`` they are kept clear."""
-        rooms = self.rooms(q)
-        names = np.array([room.what for room in self._rooms], dtype=object)
-        return {str(name): np.asarray((rooms[names == name] >= self.need).all(axis=0)) for name in dict.fromkeys(names)}
+        apart = self.distances(q)
+        names = np.array([pair.thing for pair in self._pairs], dtype=object)
+        return {str(name): np.asarray((apart[names == name] >= self.need).all(axis=0)) for name in dict.fromkeys(names)}
 
     def sifted(self, q: Array) -> tuple[Array, dict[str, int]]:
         """Return those of joint positions ``(n, joints)`` where all is kept clear, and how many others what has cost.
 
         What takes longest is asked last, of those that are left, so each is lost to one thing alone.
         """
-        names = sorted({room.what for room in self._rooms}, key=lambda name: (name not in (FLOOR, LINKS), name))
+        names = sorted({pair.thing for pair in self._pairs}, key=lambda name: (name not in (FLOOR, LINKS), name))
         lost = dict.fromkeys(names, 0)
         for name in names:
             if name not in self._measures:
-                self._measures[name] = Measure([room for room in self._rooms if room.what == name], self.cell)
-        found = [np.zeros((0, self.arm.joints))]
+                self._measures[name] = Measure([pair for pair in self._pairs if pair.thing == name], self.cell)
+        passed = [np.zeros((0, self.arm.joints))]
         for part in _parts(q):
             points, left = self.arm.points(part), np.arange(len(part))
             for name in names:
                 clear = (self._measures[name](points[..., left]) >= self.need).all(axis=0)
                 lost[name] += int(np.sum(~clear))
                 left = left[clear]
-            found.append(part[left])
-        return np.concatenate(found), lost
+            passed.append(part[left])
+        return np.concatenate(passed), lost
 
     def words(self, number: int) -> str:
         """Say what comes near what."""
-        return self._rooms[number].words if self._rooms else "nothing"
+        return self._pairs[number].words if self._pairs else "nothing"
 
     # -- on ways -------------------------------------------------------------------------------------------
 
     def ways(self, starts: Array, ends: Array) -> Checked:
         """Look at ways from joint positions `starts` to `ends`, each ``(n, joints)``, all joints moving at once."""
         count = len(starts)
-        if not self._rooms or not count:
+        if not self._pairs or not count:
             return Checked(np.ones(count, bool), np.full(count, np.inf), np.zeros(count, np.intp))
-        at_start, at_end = self.rooms(starts), self.rooms(ends)
+        at_start, at_end = self.distances(starts), self.distances(ends)
         least, worst = _least(np.concatenate([at_start[None], at_end[None]]).min(axis=0))
         way = np.arange(count)
         while len(way):
@@ -269,11 +269,11 @@ class CollisionCheck:
             left = np.flatnonzero(~sure.all(axis=0) & (least[way] >= self.need))
             way, starts, ends = way[left], starts[left], ends[left]
             middle = (starts + ends) / 2.0
-            at_middle = self.rooms(middle)
-            room, number = _least(at_middle)
-            order = np.argsort(-room, kind="stable")
-            nearer = order[room[order] < least[way[order]]]
-            least[way[nearer]], worst[way[nearer]] = room[nearer], number[nearer]
+            at_middle = self.distances(middle)
+            distance, number = _least(at_middle)
+            order = np.argsort(-distance, kind="stable")
+            nearer = order[distance[order] < least[way[order]]]
+            least[way[nearer]], worst[way[nearer]] = distance[nearer], number[nearer]
             at_start, at_end = (
                 np.concatenate([at_start[:, left], at_middle], axis=1),
                 np.concatenate([at_middle, at_end[:, left]], axis=1),
@@ -283,26 +283,26 @@ class CollisionCheck:
         return Checked(least >= self.need, least, worst)
 
     def spread(self, starts: Array, ends: Array) -> Array:
-        """Return how much each room changes at most on ways, each end ``(n, joints)`` [m], ``(rooms, n)``."""
+        """Return how much each distance changes at most on ways, each end ``(n, joints)`` [m], ``(pairs, n)``."""
         return np.asarray(self._speeds @ np.abs(ends - starts).T)
 
     @property
-    def whats(self) -> tuple[str, ...]:
-        """What each room is kept to: the floor, a box or the links."""
-        return tuple(room.what for room in self._rooms)
+    def things(self) -> tuple[str, ...]:
+        """What each distance is kept to: the floor, a box or the links."""
+        return tuple(pair.thing for pair in self._pairs)
 
     @cached_property
     def _speeds(self) -> Array:
-        """How fast each room changes at most with each joint [m per rad, or m per m], ``(rooms, joints)``."""
-        speeds = np.zeros((len(self._rooms), self.arm.joints))
-        for k, room in enumerate(self._rooms):
-            if room.piece is None:
-                speeds[k] = self._speed_of(room.point, 0)
+        """How fast each distance changes at most with each joint [m per rad, or m per m], ``(pairs, joints)``."""
+        speeds = np.zeros((len(self._pairs), self.arm.joints))
+        for k, pair in enumerate(self._pairs):
+            if pair.piece is None:
+                speeds[k] = self._speed_of(pair.point, 0)
                 if self._upright:
                     speeds[k, 0] = 0.0
             else:
                 # Joints up to the start of the one move both alike.
-                moved, beyond = (room.piece, 0) if room.other is None else (room.other, room.piece.capsule.start)
+                moved, beyond = (pair.piece, 0) if pair.other is None else (pair.other, pair.piece.capsule.start)
                 speeds[k] = np.max([self._speed_of(point, beyond) for point in moved.capsule.points], axis=0)
         return speeds
 
@@ -321,7 +321,7 @@ class CollisionCheck:
 
     @cached_property
     def _measure(self) -> Measure:
-        return Measure(self._rooms, self.cell)
+        return Measure(self._pairs, self.cell)
 
     @cached_property
     def _upright(self) -> bool:
@@ -338,7 +338,7 @@ class CollisionCheck:
         fixed = self.arm.fixed
         return [c for c in (*self.arm.links, *self.arm.tools) if not (c.start in fixed and c.end in fixed)]
 
-    def _to_the_floor(self) -> list[Room]:
+    def _to_the_floor(self) -> list[CollisionPair]:
         if self.cell.floor is None:
             return []
         radius: dict[int, float] = {}
@@ -348,18 +348,20 @@ class CollisionCheck:
         # What no joint raises or lowers is where it was mounted.
         level = np.ptp(self.arm.sampled[:, 2], axis=1) < 1e-3
         return [
-            Room(FLOOR, f"{self._point(k)} comes near the {self.cell.surface}", point=k, radius=r)
+            CollisionPair(FLOOR, f"{self._point(k)} comes near the {self.cell.surface}", point=k, radius=r)
             for k, r in sorted(radius.items())
             if not level[k]
         ]
 
-    def _to_the_boxes(self) -> list[Room]:
-        rooms = []
+    def _to_the_boxes(self) -> list[CollisionPair]:
+        pairs = []
         for number, box in enumerate(self.cell.boxes):
             for capsule in self._moving():
                 words = f"{self._name(capsule)} comes near the box '{box.name}'"
-                rooms.append(Room(f"{KEPT_OUT}{box.name}", words, self._beyond_fixed(capsule, number), box=number))
-        return rooms
+                pairs.append(
+                    CollisionPair(f"{KEPT_OUT}{box.name}", words, self._beyond_fixed(capsule, number), box=number)
+                )
+        return pairs
 
     def _beyond_fixed(self, capsule: Capsule, box: int) -> Piece:
         """Return a capsule without what is next to its start where that stands still.
@@ -375,14 +377,14 @@ class CollisionCheck:
         out = [k for k, start in enumerate(starts) if self.arm.aside[start] + 2.0 * capsule.gap > near]
         for k in tuple(out):
             stub = Capsule(starts[k], starts[k], capsule.radius)
-            if (Measure([Room("", "", Piece(stub), box=box)], self.cell)(self.arm.sampled) < self.need).all():
+            if (Measure([CollisionPair("", "", Piece(stub), box=box)], self.cell)(self.arm.sampled) < self.need).all():
                 out.remove(k)
                 name = self.cell.boxes[box].name
                 self._stubs[f"{self._name(capsule)}, next to {self._point(capsule.start)}, and the box '{name}'"] = None
         return Piece(capsule, first, whole=frozenset(out))
 
-    def _between_links(self) -> list[Room]:
-        links, rooms = self.arm.links, []
+    def _between_links(self) -> list[CollisionPair]:
+        links, pairs = self.arm.links, []
         for i, link in enumerate(links):
             for other in (*links[i + 1 :], *self.arm.tools):
                 between = self.arm.along[self.arm.flange if other.tool else other.start] - self.arm.along[link.end]
@@ -392,18 +394,18 @@ class CollisionCheck:
                 pieces = self._without_connection(link, other, max(apart - float(between), 0.0))
                 if pieces is not None:
                     words = f"{self._name(link)} and {self._name(other)}{_NEAR}"
-                    rooms.append(Room(LINKS, words, *pieces))
-        return rooms
+                    pairs.append(CollisionPair(LINKS, words, *pieces))
+        return pairs
 
-    def _without_connection(self, one: Capsule, other: Capsule, length: float) -> tuple[Piece, Piece] | None:
+    def _without_connection(self, capsule: Capsule, other: Capsule, length: float) -> tuple[Piece, Piece] | None:
         """Take away a length where two links are connected, half of each, all of the longer if one is too short."""
-        long, far = self._length(one), self._length(other)
+        long, far = self._length(capsule), self._length(other)
         taken = length / 2.0, length / 2.0
         if min(long, far) <= length / 2.0:
             taken = (length, 0.0) if long > far else (0.0, length)
         if taken[0] >= long or taken[1] >= far:
             return None
-        return Piece(one, 0.0, 1.0 - taken[0] / long), Piece(other, taken[1] / far)
+        return Piece(capsule, 0.0, 1.0 - taken[0] / long), Piece(other, taken[1] / far)
 
     def _length(self, capsule: Capsule) -> float:
         """Return how long a capsule is at most [m]."""
@@ -423,7 +425,7 @@ class CollisionCheck:
             return f"target '{self.arm.targets[point - self.arm.flange - 1]}'"
         return "the flange" if point == self.arm.flange else f"joint {point}"
 
-    def _refuse_held(self) -> None:
+    def _refuse_around_base(self) -> None:
         """Refuse a box that the base of the robot would stand in."""
         fixed = self.arm.sampled[list(self.arm.fixed), :, 0]
         column = fixed[0] + np.linspace(0.0, 1.0, 50)[:, None] * (fixed[-1] - fixed[0])
@@ -444,9 +446,9 @@ class CollisionCheck:
                 )
 
 
-def _least(rooms: Array) -> tuple[Array, NDArray[np.intp]]:
-    number = np.argmin(rooms, axis=0) if len(rooms) and rooms.shape[1] else np.zeros(rooms.shape[1], np.intp)
-    return np.asarray(np.take_along_axis(rooms, number[None], axis=0)[0]), number
+def _least(apart: Array) -> tuple[Array, NDArray[np.intp]]:
+    number = np.argmin(apart, axis=0) if len(apart) and apart.shape[1] else np.zeros(apart.shape[1], np.intp)
+    return np.asarray(np.take_along_axis(apart, number[None], axis=0)[0]), number
 
 
 def _parts(q: Array) -> list[Array]:

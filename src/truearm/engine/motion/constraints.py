@@ -125,9 +125,9 @@ def allowed(
     world = robot.base
     robot = at_the_origin(robot)
     low, high = limits_of(robot, constraints, where)
-    kept: dict[str, Allowed] = {"limits": np.asarray(((q >= low) & (q <= high)).all(axis=1))}
+    masks: dict[str, Allowed] = {"limits": np.asarray(((q >= low) & (q <= high)).all(axis=1))}
     if constraints is None:
-        return kept
+        return masks
     length = constraints.units.length
     if constraints.moments:
         if not robot.masses and not robot.payload.mass:
@@ -140,7 +140,7 @@ def allowed(
         for number, sign in constraints.moments.items():
             joint = _joint(robot, number, f"{where}, moments")
             row = 5 if robot.joints[joint].kind == "revolute" else 2
-            kept[f"moment_{number}"] = np.asarray(loads[joint, row] * (1.0 if sign == "positive" else -1.0) > 0.0)
+            masks[f"moment_{number}"] = np.asarray(loads[joint, row] * (1.0 if sign == "positive" else -1.0) > 0.0)
     targets = [robot.world_poses(postures, target.name)[0] for target in robot.targets]
     if constraints.box is not None:
         if constraints.box.of == "targets" and not targets:
@@ -151,21 +151,21 @@ def allowed(
                 cure="Write of: flange, or give a robot file that has the targets.",
             )
         points = targets if constraints.box.of == "targets" else [robot.world_poses(postures)[0]]
-        kept["box"] = _in_box(constraints.box, points, length, f"{where}, box")
+        masks["box"] = _in_box(constraints.box, points, length, f"{where}, box")
     if constraints.floor is not None:
         height = sized_si(constraints.floor, length, f"{where}, floor")
         kinematics = robot.forward_kinematics(postures)
         joints = [kinematics.origin(element).T for element in robot.moving[2 : len(robot.joints)]]
-        kept["floor"] = np.all(
+        masks["floor"] = np.all(
             [points[:, 2] >= height for points in (*joints, kinematics.position.T, *targets)], axis=0
         )
     if constraints.visibility is not None:
         origin = -world.rotation.T @ np.array(world.translation) if seen_from_the_origin else None
-        kept |= _visible(robot, postures, constraints.visibility, constraints.units, f"{where}, visibility", origin)
+        masks |= _visible(robot, postures, constraints.visibility, constraints.units, f"{where}, visibility", origin)
     if constraints.clearance is not None:
         least = sized_si(constraints.clearance, length, f"{where}, clearance")
-        kept["clearance"] = smallest_clearance(robot, postures, least) >= least
-    return kept
+        masks["clearance"] = smallest_clearance(robot, postures, least) >= least
+    return masks
 
 
 def refuse_clearance_of(robot: Robot, constraints: Constraints | None, where: str) -> None:
@@ -190,10 +190,10 @@ def limits_of(robot: Robot, constraints: Constraints | None, where: str) -> tupl
     low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in robot.joints]).T
     if constraints is None:
         return low, high
-    for number, given in constraints.limits.items():
+    for number, limits in constraints.limits.items():
         joint = _joint(robot, number, f"{where}, limits")
         unit = constraints.units.angle if robot.joints[joint].kind == "revolute" else constraints.units.length
-        first, last = _range(given, unit, f"{where}, limits, {number}")
+        first, last = _range(limits, unit, f"{where}, limits, {number}")
         low[joint], high[joint] = max(low[joint], first), min(high[joint], last)
     return low, high
 
@@ -208,7 +208,7 @@ def keep_out(constraints: Constraints, where: str) -> dict[str, tuple[Array, Arr
     corners = {}
     for name, box in constraints.keep_out.items():
         ranges = (box.x, box.y, box.z)
-        if all(given is None for given in ranges):
+        if all(span is None for span in ranges):
             raise InputError(
                 "a box to keep out of that has no end leaves no room",
                 where=f"{where}, keep_out, {name}",
@@ -216,9 +216,9 @@ def keep_out(constraints: Constraints, where: str) -> dict[str, tuple[Array, Arr
             )
         ends = [
             (-np.inf, np.inf)
-            if given is None
-            else _range(given, constraints.units.length, f"{where}, keep_out, {name}, {'xyz'[axis]}")
-            for axis, given in enumerate(ranges)
+            if span is None
+            else _range(span, constraints.units.length, f"{where}, keep_out, {name}, {'xyz'[axis]}")
+            for axis, span in enumerate(ranges)
         ]
         low, high = np.array(ends).T
         corners[name] = (low, high)
@@ -231,8 +231,8 @@ def _joint(robot: Robot, number: int, where: str) -> int:
     return number - 1
 
 
-def _range(given: tuple[float, float], unit: str, where: str) -> tuple[float, float]:
-    low, high = (sized_si(value, unit, where) for value in given)
+def _range(ends: tuple[float, float], unit: str, where: str) -> tuple[float, float]:
+    low, high = (sized_si(value, unit, where) for value in ends)
     if low > high:
         raise InputError("the range is empty", where=where, cure="The lower one comes first.")
     return low, high
@@ -244,9 +244,9 @@ def _columns(wrench: Array | None) -> Array | None:
 
 def _in_box(box: Box, points: list[Array], length: str, where: str) -> Allowed:
     inside = np.ones(len(points[0]), dtype=bool)
-    for axis, given in enumerate((box.x, box.y, box.z)):
-        if given is not None:
-            low, high = _range(given, length, f"{where}, {'xyz'[axis]}")
+    for axis, span in enumerate((box.x, box.y, box.z)):
+        if span is not None:
+            low, high = _range(span, length, f"{where}, {'xyz'[axis]}")
             for point in points:
                 inside &= (point[:, axis] >= low) & (point[:, axis] <= high)
     return inside
@@ -268,15 +268,15 @@ def _visible(
         )
     within = sized_si(rule.within, units.angle, f"{where}, within")
     rotation = robot.world_poses(postures)[1]
-    kept = {}
+    by_target = {}
     for name, direction in rule.targets.items():
         with refusals_at(f"{where}, targets"):
             robot.target(name)
         looks = rotation @ (np.array(direction) / np.linalg.norm(direction))
         sight = instrument - robot.world_poses(postures, name)[0]
         cosine = np.einsum("ni,ni->n", looks, sight) / np.linalg.norm(sight, axis=1)
-        kept[f"visibility_{name}"] = np.asarray(cosine >= np.cos(within))
-    return kept
+        by_target[f"visibility_{name}"] = np.asarray(cosine >= np.cos(within))
+    return by_target
 
 
 def at_the_origin(robot: Robot) -> Robot:
@@ -304,13 +304,13 @@ def joint_window(
         if low[k] > high[k]:
             assert constraints is not None
             unit, size = ("deg", math.degrees(1.0)) if joint.kind == "revolute" else ("mm", 1e3)
-            given = constraints.limits[k + 1]
-            as_given = constraints.units.angle if joint.kind == "revolute" else constraints.units.length
+            limits = constraints.limits[k + 1]
+            own_unit = constraints.units.angle if joint.kind == "revolute" else constraints.units.length
             raise InputError(
                 f"the limits of joint {k + 1} leave nothing of what the robot has",
                 parameter="constraints",
                 where=f"{where}, limits",
-                came=f"{given[0]:g} to {given[1]:g} {as_given}",
+                came=f"{limits[0]:g} to {limits[1]:g} {own_unit}",
                 allowed=f"within {size * lowest:.6g} to {size * highest:.6g} {unit}",
                 cure="Check the number of the joint, and the sign and the unit of its limits.",
             )

@@ -130,13 +130,13 @@ class Cube:
     @property
     def planes(self) -> tuple[DiagonalPlane, ...]:
         """The four diagonal planes of ISO 9283."""
-        corners, made = self.corners, []
+        corners, planes = self.corners, []
         for name, (a, b, _, d) in PLANES.items():
             along, across = (corners[a] - corners[k] for k in (b, d))
-            made.append(
+            planes.append(
                 DiagonalPlane(name, self.centre, along / self.side, across / (math.sqrt(2.0) * self.side), self.side)
             )
-        return tuple(made)
+        return tuple(planes)
 
     def plane(self, name: str) -> DiagonalPlane:
         """Return the diagonal plane of this name."""

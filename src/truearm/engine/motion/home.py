@@ -38,20 +38,20 @@ def safe_configuration(check: CollisionCheck, low: Array, high: Array) -> Array:
     joints = check.arm.robot.joints
     turning = np.array([joint.kind == "revolute" for joint in joints])
     holds_zero = (low <= -_INSIDE) & (high >= _INSIDE) & turning
-    rest = np.where(holds_zero, 0.0, (low + high) / 2.0)
+    middle = np.where(holds_zero, 0.0, (low + high) / 2.0)
     tried = [k for k in range(1, min(6, len(low))) if turning[k]]
     grid = np.array([*product(*(_FEWER if k == 5 else _ANGLES for k in tried))], ndmin=2)
     within = (grid >= (low + _INSIDE)[tried]) & (grid <= (high - _INSIDE)[tried])
-    at = np.tile(rest, (len(grid) + 1, 1))
-    at[1:, tried] = np.where(within, grid, rest[tried])
-    best, room = _best(check, at, rest)
-    if room < check.need:
+    at = np.tile(middle, (len(grid) + 1, 1))
+    at[1:, tried] = np.where(within, grid, middle[tried])
+    best, distance = _best(check, at, middle)
+    if distance < check.need:
         drawn = np.random.default_rng(0).uniform(low, high, (_DRAWN, len(low)))
-        other, more = _best(check, drawn, rest)
-        if more > room:
-            best, room = other, more
-    if room < check.need:
-        number = int(np.argmin(check.rooms(best[None])[:, 0]))
+        other, more = _best(check, drawn, middle)
+        if more > distance:
+            best, distance = other, more
+    if distance < check.need:
+        number = int(np.argmin(check.distances(best[None])[:, 0]))
         raise InputError(
             "no configuration was found in which the arm keeps clear, to start and to end in",
             parameter="clearance",
@@ -62,14 +62,14 @@ def safe_configuration(check: CollisionCheck, low: Array, high: Array) -> Array:
     return best
 
 
-def _best(check: CollisionCheck, at: Array, rest: Array) -> tuple[Array, float]:
-    """Return the configuration with most room, the nearest to rest of those, and its room [m]."""
-    room = check.room(at)
-    enough = np.minimum(room, max(_ENOUGH * float(check.arm.along[check.arm.flange]), check.need))
-    away = np.abs(at - rest).sum(axis=1)
-    # To a millimetre, so that the nearest of many with the same room does not depend on the last digit.
+def _best(check: CollisionCheck, at: Array, middle: Array) -> tuple[Array, float]:
+    """Return the configuration farthest from everything, the nearest to the middle of those, and its distance [m]."""
+    distance = check.smallest_distance(at)
+    enough = np.minimum(distance, max(_ENOUGH * float(check.arm.along[check.arm.flange]), check.need))
+    away = np.abs(at - middle).sum(axis=1)
+    # To a millimetre, so that the nearest of many at the same distance does not depend on the last digit.
     best = int(np.lexsort((np.arange(len(at)), away.round(6), -(enough / 1e-3).round()))[0])
-    return np.asarray(at[best]), float(room[best])
+    return np.asarray(at[best]), float(distance[best])
 
 
 def checked_home(check: CollisionCheck, home: Array, low: Array, high: Array) -> Array:
@@ -88,13 +88,13 @@ def checked_home(check: CollisionCheck, home: Array, low: Array, high: Array) ->
                 allowed=f"{size * low[k]:.6g} to {size * high[k]:.6g} {unit}",
                 cure="Name it on the same turn, or leave it out: one is found.",
             )
-    rooms = check.rooms(home[None])[:, 0]
-    if rooms.min(initial=np.inf) < check.cell.clearance:
-        number = int(np.argmin(rooms))
+    distances = check.distances(home[None])[:, 0]
+    if distances.min(initial=np.inf) < check.cell.clearance:
+        number = int(np.argmin(distances))
         raise InputError(
             "the safe configuration is not clear",
             parameter="home",
-            came=f"{check.words(number)}: {max(rooms[number], 0.0) * 1e3:.1f} mm",
+            came=f"{check.words(number)}: {max(distances[number], 0.0) * 1e3:.1f} mm",
             allowed=f"{check.cell.clearance * 1e3:g} mm or more",
             cure="Name another one, or leave it out: one is found. `clearance` says how much room is kept.",
         )

@@ -203,8 +203,8 @@ class _Follower:
             if k > 1:
                 last, before = self._path.time[k - 1], self._path.time[k - 2]
                 guess = guess + (scaled[k - 1] - scaled[k - 2]) * (time - last) / (last - before)
-            found = self._solved(k, guess, scaled[0])
-            if found is None:
+            solution = self._solved(k, guess, scaled[0])
+            if solution is None:
                 raise InputError(
                     "the arm cannot follow the path any further: it leaves the reach, or comes to a singular posture"
                     + (", or, with joints to spare, to the end of the postures near the first" if self._spare else ""),
@@ -212,7 +212,7 @@ class _Follower:
                     came=f"orientation '{self._orientation}'",
                     cure=self._cure("Move the path towards the arm", "start elsewhere (`seed_joints`)"),
                 )
-            scaled[k], A = found
+            scaled[k], A = solution
             self._check_limits(k, scaled[k] * self._scale)
             side = self._check_regular(k, A, side)
             jump = np.abs(scaled[k] - guess)
@@ -265,9 +265,9 @@ class _Follower:
     def _check_regular(self, k: int, A: Array, side: float) -> float:
         """Refuse a singular posture at or before sample `k`; return the side of it on which the arm is."""
         _, values, motions = np.linalg.svd(A, full_matrices=False)
-        now = float(np.sign(np.linalg.det(A))) if A.shape[0] == A.shape[1] else 0.0
-        if values[-1] >= NEAR_SINGULAR and now * side >= 0:
-            return now
+        sign = float(np.sign(np.linalg.det(A))) if A.shape[0] == A.shape[1] else 0.0
+        if values[-1] >= NEAR_SINGULAR and sign * side >= 0:
+            return sign
         fastest = int(np.abs(motions[-1]).argmax())
         raise InputError(
             "the path passes a singular posture",

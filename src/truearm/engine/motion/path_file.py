@@ -66,13 +66,13 @@ class _About(BaseModel):
     normal: Triple
 
 
-class _Kept(BaseModel):
+class _TipOrientation(BaseModel):
     model_config = STRICT
     axis: Triple | None = None
     quaternion: Quaternion | None = None
 
     @model_validator(mode="after")
-    def _one_of_them(self) -> _Kept:
+    def _one_of_them(self) -> _TipOrientation:
         if (self.axis is None) == (self.quaternion is None):
             raise InputError("one orientation belongs here", allowed="axis: [x, y, z], or quaternion: [w, x, y, z]")
         return self
@@ -99,10 +99,10 @@ class _Section(BaseModel):
 
     @model_validator(mode="after")
     def _one_kind(self) -> _Section:
-        given = [name for name in ("line", "circle", "hermite") if getattr(self, name) is not None]
-        if len(given) != 1:
+        kinds = [name for name in ("line", "circle", "hermite") if getattr(self, name) is not None]
+        if len(kinds) != 1:
             raise InputError(
-                "a section is of one kind", came=" and ".join(given) or "none", allowed="line, circle or hermite"
+                "a section is of one kind", came=" and ".join(kinds) or "none", allowed="line, circle or hermite"
             )
         timed_itself = self.velocities is not None or self.times is not None
         if timed_itself and (self.velocities is None or self.times is None or self.hermite is None):
@@ -127,7 +127,7 @@ class PathFile(BaseModel):
     frame: PathFrame = "nominal"
     tip: Triple | None = None
     target: str | None = None
-    orientation: _Kept | None = None
+    orientation: _TipOrientation | None = None
     speed: Positive
     acceleration: Positive
     step: Positive
@@ -197,7 +197,7 @@ def planned_path(content: PathFile, source: str) -> PlannedPath:
         where = f"{source}, sections[{number}]"
         with refusals_at(where):
             if section.times is not None:
-                part = _as_given(section, at, step, length, where)
+                part = _prescribed(section, at, step, length, where)
                 kind = "hermite"
             else:
                 kind, way = _way(section, at, length, where)
@@ -212,8 +212,8 @@ def planned_path(content: PathFile, source: str) -> PlannedPath:
         kinds.append(kind)
         numbers.append(np.full(len(parts[-1].time), number))
         began, at = float(parts[-1].time[-1]), parts[-1].position[-1]
-        refuse_beyond("samples", sum(len(one.time) for one in parts), where=where)
-    joined = [np.concatenate([getattr(one, name) for one in parts]) for name in _FIELDS]
+        refuse_beyond("samples", sum(len(part.time) for part in parts), where=where)
+    joined = [np.concatenate([getattr(part, name) for part in parts]) for name in _FIELDS]
     with refusals_at(f"{source}, orientation"):
         orientation, rotation = _orientation(content.orientation)
     tip = None
@@ -247,17 +247,17 @@ def _way(section: _Section, start: Array, length: str, where: str) -> tuple[str,
     if isinstance(section.circle, _About):
         return "circle", Circle(place(section.circle.centre), start, _unit(section.circle.normal))
     if section.circle is not None:
-        return "circle", Circle.through(start, *(place(one) for one in section.circle))
+        return "circle", Circle.through(start, *(place(point) for point in section.circle))
     assert section.hermite is not None
-    return "hermite", Hermite(_waypoints(start, [place(one) for one in section.hermite], length))
+    return "hermite", Hermite(_waypoints(start, [place(point) for point in section.hermite], length))
 
 
-def _as_given(section: _Section, start: Array, step: float, length: str, where: str) -> Trajectory:
+def _prescribed(section: _Section, start: Array, step: float, length: str, where: str) -> Trajectory:
     """Return a section whose waypoints have times and velocities."""
     assert section.hermite is not None
     assert section.velocities is not None
     assert section.times is not None
-    points = [np.array([sized_si(v, length, where) for v in one]) for one in section.hermite]
+    points = [np.array([sized_si(v, length, where) for v in point]) for point in section.hermite]
     waypoints = _waypoints(start, points, length)
     velocities = np.array([[sized_si(v, length, where) for v in velocity] for velocity in section.velocities])
     times = np.array(section.times)
@@ -281,8 +281,8 @@ def _as_given(section: _Section, start: Array, step: float, length: str, where: 
 
 def _waypoints(start: Array, points: Sequence[Array], length: str) -> Array:
     waypoints = np.array([start, *points])
-    for number, (one, other) in enumerate(pairwise(waypoints), 1):
-        if np.linalg.norm(other - one) < _SAME:
+    for number, (waypoint, other) in enumerate(pairwise(waypoints), 1):
+        if np.linalg.norm(other - waypoint) < _SAME:
             raise InputError(
                 "a waypoint repeats the one before it",
                 came=f"waypoint {number}, {np.round(other * 1e3, 3).tolist()} mm",
@@ -296,13 +296,13 @@ def _refuse_too_many(duration: float, step: float) -> None:
     refuse_beyond("samples", int(min(duration / step, 1e9)))
 
 
-def _orientation(given: _Kept | None) -> tuple[Orientation, Array]:
-    if given is None:
+def _orientation(entry: _TipOrientation | None) -> tuple[Orientation, Array]:
+    if entry is None:
         return "free", np.eye(3)
-    if given.quaternion is not None:
-        return "full", np.asarray(rotation_from_quaternion(np.array([given.quaternion]))[0])
-    assert given.axis is not None
-    z = _unit(given.axis)
+    if entry.quaternion is not None:
+        return "full", np.asarray(rotation_from_quaternion(np.array([entry.quaternion]))[0])
+    assert entry.axis is not None
+    z = _unit(entry.axis)
     x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
     x /= np.linalg.norm(x)
     return "axis", np.stack([x, np.cross(z, x), z], axis=1)

@@ -126,7 +126,7 @@ class Circle:
     @classmethod
     def through(cls, first: ArrayLike, second: ArrayLike, third: ArrayLike) -> Circle:
         """Make the circle that begins at the first point and passes the second before the third [m]."""
-        a, b, c = (point("point of the circle", given) for given in (first, second, third))
+        a, b, c = (point("point of the circle", coordinates) for coordinates in (first, second, third))
         u, v = b - a, c - a
         n = np.cross(u, v)
         if np.linalg.norm(n) <= 1e-9 * max(u @ u, v @ v):
@@ -266,9 +266,9 @@ class Hermite:
         return total * half
 
 
-def point(name: str, given: ArrayLike) -> Array:
+def point(name: str, coordinates: ArrayLike) -> Array:
     """Return three finite coordinates [m], or refuse what was given."""
-    values = np.asarray(given, float)
+    values = np.asarray(coordinates, float)
     if values.shape != (3,) or not np.isfinite(values).all():
         raise InputError("a point needs three finite coordinates", where=name, came=str(values))
     return values

@@ -42,7 +42,7 @@ class Tour:
     stops: tuple[Stop, ...]  #: Three or more.
     floor: float | None  #: Height of the floor in the base frame [m]; None if none is kept clear.
     clearance: float  #: What is kept between the arm and the floor, boxes and its own links [m].
-    room: float  #: The smallest such distance on the ways [m]; infinite if there is nothing to come close to.
+    distance: float  #: The smallest such distance on the ways [m]; infinite if there is nothing to come close to.
     surface: str = FLOOR  #: What the plane at the height `floor` is called.
     #: How near the arm comes to each thing on the ways [m], the smallest first: ``floor``, ``keep_out`` and the name of
     #: a box, ``links`` for its own.
@@ -112,20 +112,20 @@ def distance_words(distances: Mapping[str, float], floor: float | None, surface:
     """
     # Down to a tenth of a millimetre: never more than there is.
     near = [
-        (f"{math.floor(room * 1e4) / 10:g} mm", _thing(what, floor, surface, connected))
-        for what, room in distances.items()
+        (f"{math.floor(distance * 1e4) / 10:g} mm", _thing(thing, floor, surface, connected))
+        for thing, distance in distances.items()
     ]
-    return ", ".join(f"{room}{'' if k else ' or more'} from {thing}" for k, (room, thing) in enumerate(near))
+    return ", ".join(f"{distance}{'' if k else ' or more'} from {thing}" for k, (distance, thing) in enumerate(near))
 
 
-def _thing(what: str, floor: float | None, surface: str, connected: float) -> str:
+def _thing(thing: str, floor: float | None, surface: str, connected: float) -> str:
     """Return what the arm comes near in words."""
-    if what == LINKS:
+    if thing == LINKS:
         stretch = math.ceil(connected * 100.0) * 10
         return f"its own links (but for up to {stretch} mm of the arm where two are connected)"
-    if what == FLOOR and floor is not None:
+    if thing == FLOOR and floor is not None:
         return f"the {surface} at {floor * 1e3:g} mm"
-    return f"the box '{what.removeprefix(KEPT_OUT)}'"
+    return f"the box '{thing.removeprefix(KEPT_OUT)}'"
 
 
 def ways_beside(table: Path) -> Path:
@@ -146,6 +146,6 @@ def tour_summary(tour: Tour, robot: Robot, joints_are: JointsOf) -> dict[str, An
         "home": home_shown(tour.home, robot, joints_are),
         "floor_mm": None if tour.floor is None else 1e3 * tour.floor,
         "clearance_mm": 1e3 * tour.clearance,
-        "room_mm": 1e3 * tour.room if math.isfinite(tour.room) else None,
-        "distances_mm": {what: 1e3 * room for what, room in tour.distances.items()},
+        "room_mm": 1e3 * tour.distance if math.isfinite(tour.distance) else None,
+        "distances_mm": {thing: 1e3 * distance for thing, distance in tour.distances.items()},
     }

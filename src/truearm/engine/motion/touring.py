@@ -26,40 +26,40 @@ _PART: Final = 0.002
 def nearest_on(check: CollisionCheck, joints: Array) -> dict[str, float]:
     """Return how near an arm comes to each thing [m] where it is driven through configurations ``(n, joints)``.
 
-    Each way is halved as long as a part of it could be nearer than the nearest found, by how fast rooms change at most.
-    The distances hold all the way: somewhere the arm comes as near but for 0.1 mm or 0.2 % of them.
+    Each way is halved as long as a part of it could be nearer than the nearest found, by how fast distances change at
+    most. The distances hold all the way: somewhere the arm comes as near but for 0.1 mm or 0.2 % of them.
 
     Returns:
         distances: By the floor, each box and the links, the smallest first. Negative where they touch.
     """
-    whats = list(dict.fromkeys(check.whats))
-    thing = np.array([whats.index(what) for what in check.whats], dtype=np.intp)
+    things = list(dict.fromkeys(check.things))
+    thing = np.array([things.index(name) for name in check.things], dtype=np.intp)
     starts, ends = (joints[:-1], joints[1:]) if len(joints) > 1 else (joints, joints)
-    at = check.rooms(joints)
+    at = check.distances(joints)
     at_start, at_end = (at[:, :-1], at[:, 1:]) if len(joints) > 1 else (at, at)
-    least = np.full(len(whats), np.inf)
+    least = np.full(len(things), np.inf)
     _lower(least, thing, at)
-    tolerance = np.zeros(len(whats))
+    tolerance = np.zeros(len(things))
     while len(starts):
         tolerance = np.maximum(_TOLERANCE, _PART * least)
         could = (at_start + at_end - check.spread(starts, ends)) / 2.0
         left = np.flatnonzero((could < (least - tolerance)[thing][:, None]).any(axis=0))
         starts, ends = starts[left], ends[left]
         middle = (starts + ends) / 2.0
-        at_middle = check.rooms(middle)
+        at_middle = check.distances(middle)
         _lower(least, thing, at_middle)
         at_start, at_end = (
             np.concatenate([at_start[:, left], at_middle], axis=1),
             np.concatenate([at_middle, at_end[:, left]], axis=1),
         )
         starts, ends = np.concatenate([starts, middle]), np.concatenate([middle, ends])
-    found = {what: float(least[k] - max(_TOLERANCE, _PART * least[k])) for k, what in enumerate(whats)}
-    return dict(sorted(found.items(), key=lambda item: item[1]))
+    nearest = {name: float(least[k] - max(_TOLERANCE, _PART * least[k])) for k, name in enumerate(things)}
+    return dict(sorted(nearest.items(), key=lambda item: item[1]))
 
 
-def _lower(least: Array, thing: NDArray[np.intp], rooms: Array) -> None:
-    if rooms.shape[1]:
-        np.minimum.at(least, thing, rooms.min(axis=1))
+def _lower(least: Array, thing: NDArray[np.intp], distances: Array) -> None:
+    if distances.shape[1]:
+        np.minimum.at(least, thing, distances.min(axis=1))
 
 
 #: A box whose sides are all shorter is meant in another unit [m].
@@ -106,8 +106,8 @@ def limits_notices(robot: Robot, low: Array, high: Array) -> tuple[Notice, ...]:
             narrow.append(f"joint {k + 1} from {size * low[k]:.4g} to {size * high[k]:.4g} {unit}")
     if not narrow:
         return ()
-    told = "Hardly any range is left to a joint" if len(narrow) == 1 else "Hardly any range is left to joints"
-    return (LIMITS_TINY(f"{told}: {', '.join(narrow)}."),)
+    sentence = "Hardly any range is left to a joint" if len(narrow) == 1 else "Hardly any range is left to joints"
+    return (LIMITS_TINY(f"{sentence}: {', '.join(narrow)}."),)
 
 
 OTHER_BASE_ON_PENDANT: Final = Rule(
@@ -128,27 +128,21 @@ def _frame_notices(check: CollisionCheck) -> list[Notice]:
     named = " and ".join(
         ([f"The {cell.surface}"] if cell.floor is not None else []) + (["boxes"] if cell.boxes else [])
     )
-    kept = "are" if cell.boxes else "is"
+    verb = "are" if cell.boxes else "is"
     at = ", ".join(f"{round(1e3 * v, 3) + 0.0:g}" for v in moved)
     also = f", turned by {np.degrees(turned):.4g} deg" if turned >= _SAME else ""
     return [
         OTHER_BASE_ON_PENDANT(
-            f"{named[0].upper()}{named[1:]} {kept} kept in the base frame of the robot file. The pendant shows "
+            f"{named[0].upper()}{named[1:]} {verb} kept in the base frame of the robot file. The pendant shows "
             f"positions in another one, with its origin at ({at}) mm in it{also}: add that to what it shows."
         )
     ]
 
 
-BOX_TINY: Final = Rule(
-    "box-tiny",
+BOX_UNLIKELY: Final = Rule(
+    "box-unlikely",
     "warning",
-    "no side of a box is 10 mm long: its unit is another one",
-    cure="Check the unit of the constraints.",
-)
-BOX_OUT_OF_REACH: Final = Rule(
-    "box-out-of-reach",
-    "warning",
-    "a box that the arm never comes near: its unit or its frame may be another one",
+    "a box that has no side of 10 mm, or that the arm never comes near: its unit or its frame may be another one",
     cure="Check its unit, and that it is in the base frame of the robot.",
 )
 
@@ -162,10 +156,10 @@ def _box_notices(check: CollisionCheck) -> list[Notice]:
         longest = float((box.high - box.low).max())
         away = float(np.linalg.norm(np.clip(0.0, box.low, box.high)))
         if longest < _TINY:
-            notices.append(BOX_TINY(f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm."))
+            notices.append(BOX_UNLIKELY(f"The longest side of the box '{box.name}' is {longest * 1e3:.3g} mm."))
         elif away - reach > check.need:
             notices.append(
-                BOX_OUT_OF_REACH(
+                BOX_UNLIKELY(
                     f"The box '{box.name}' begins {away * 1e3:.0f} mm from the base, and the arm reaches at most "
                     f"{reach * 1e3:.0f} mm: nothing is kept clear by it."
                 )
@@ -215,11 +209,11 @@ def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Arr
     stops.append(Stop(finder.home, "home"))
     cell = finder.check.cell
     distances = nearest_on(finder.check, np.array([stop.joints for stop in stops]))
-    room = min(distances.values(), default=math.inf)
+    smallest = min(distances.values(), default=math.inf)
     limits = limits_notices(finder.check.robot, finder.low, finder.high)
     notices = (*limits, *cell_notices(finder.check))
     tour = Tour(
-        tuple(stops), cell.floor, cell.clearance, room, cell.surface, distances, notices, finder.check.connected
+        tuple(stops), cell.floor, cell.clearance, smallest, cell.surface, distances, notices, finder.check.connected
     )
     _refuse_winding(finder, tour)
     return tour
@@ -227,22 +221,22 @@ def tour_of(finder: WayFinder, joints: Array, labels: Sequence[str], before: Arr
 
 def _refuse_near(finder: WayFinder, entered: Array, joints: Array, labels: Sequence[str]) -> None:
     looked = finder.check.ways(entered, joints)
-    for k in np.flatnonzero(looked.room < finder.check.cell.clearance).tolist():
+    for k in np.flatnonzero(looked.distance < finder.check.cell.clearance).tolist():
         raise InputError(
             "a configuration is too near to what the arm keeps clear of",
             where=f"configuration {labels[k]}",
-            came=f"{finder.check.words(int(looked.worst[k]))}: {max(looked.room[k], 0.0) * 1e3:.1f} mm",
+            came=f"{finder.check.words(int(looked.worst[k]))}: {max(looked.distance[k], 0.0) * 1e3:.1f} mm",
             allowed=f"{finder.check.cell.clearance * 1e3:g} mm or more",
             cure="Leave the configuration out, or lower `clearance`; `floor` says where the floor is.",
         )
 
 
 def _refuse_way(finder: WayFinder, start: Array, end: Array, left: str, reached: str) -> None:
-    looked = finder.check.ways(start[None], end[None])
+    way = finder.check.ways(start[None], end[None])
     raise InputError(
         "no way was found on which the arm keeps clear",
         where=f"from {left} to {reached}",
-        came=f"on the straight one {finder.check.words(int(looked.worst[0]))}: {max(looked.room[0], 0.0) * 1e3:.1f} mm",
+        came=f"on the straight one {finder.check.words(int(way.worst[0]))}: {max(way.distance[0], 0.0) * 1e3:.1f} mm",
         allowed=f"{finder.check.cell.clearance * 1e3:g} mm or more all the way",
         cure="Lower `clearance`, name another safe configuration (`home`), or leave one of the two out.",
     )

@@ -20,8 +20,8 @@ from truearm.engine.robot.chain import Array
 
 #: Of the ways around, how many are looked at together, the shortest first.
 _TOGETHER: Final = 64
-#: How many configurations with much room are gone over at most.
-_ROOMY: Final = 48
+#: How many configurations far from everything are gone over at most.
+_MOST_FAR: Final = 48
 _DRAWN: Final = 600
 
 
@@ -30,7 +30,7 @@ class Way:
     """A way that keeps clear."""
 
     over: Array  #: Configurations in between, ``(k, joints)``; none of a straight way.
-    room: float  #: The smallest room on it [m].
+    distance: float  #: The smallest distance on it [m].
 
 
 class WayFinder:
@@ -45,37 +45,37 @@ class WayFinder:
     def __init__(self, check: CollisionCheck, home: Array, low: Array, high: Array) -> None:
         self.check, self.home = check, home
         self.low, self.high = low, high
-        self._roomy: tuple[Array, list[Way]] | None = None
+        self._far: tuple[Array, list[Way]] | None = None
         joints = len(home)
         self._shares = np.array([[(n >> j) & 1 for j in range(joints)] for n in range(1, 2**joints - 1)], bool)
 
     def between(self, starts: Array, ends: Array) -> list[Way | None]:
         """Return a way for each pair of configurations, each ``(n, joints)``; None where none was found."""
-        found = self._straight(starts, ends)
-        for k in [k for k, way in enumerate(found) if way is None]:
-            found[k] = self._around(starts[k], ends[k])
-        left = [k for k, way in enumerate(found) if way is None]
+        ways = self._straight(starts, ends)
+        for k in [k for k, way in enumerate(ways) if way is None]:
+            ways[k] = self._around(starts[k], ends[k])
+        left = [k for k, way in enumerate(ways) if way is None]
         if left:
             out, back = (self.home_from(at) for at in (starts[left], ends[left]))
             for k, leave, come in zip(left, out, back, strict=True):
                 if leave is not None and come is not None:
                     over = np.concatenate([leave.over, self.home[None], come.over[::-1]])
-                    found[k] = Way(over, min(leave.room, come.room))
-        return found
+                    ways[k] = Way(over, min(leave.distance, come.distance))
+        return ways
 
     def home_from(self, at: Array) -> list[Way | None]:
         """Return a way from each configuration ``(n, joints)`` to the safe one; None where none was found."""
         home = np.broadcast_to(self.home, at.shape)
-        found = self._straight(at, home)
-        for k in [k for k, way in enumerate(found) if way is None]:
-            found[k] = self._around(at[k], self.home) or self._over_roomy(at[k])
-        return found
+        ways = self._straight(at, home)
+        for k in [k for k, way in enumerate(ways) if way is None]:
+            ways[k] = self._around(at[k], self.home) or self._over_far(at[k])
+        return ways
 
     def _straight(self, starts: Array, ends: Array) -> list[Way | None]:
         looked = self.check.ways(starts, ends)
         none = np.zeros((0, starts.shape[1]))
         return [
-            Way(none, float(room)) if clear else None for clear, room in zip(looked.clear, looked.room, strict=True)
+            Way(none, float(gap)) if clear else None for clear, gap in zip(looked.clear, looked.distance, strict=True)
         ]
 
     def _around(self, start: Array, end: Array) -> Way | None:
@@ -85,58 +85,42 @@ class WayFinder:
         return self._over_one(start, end, np.concatenate([self.home[None], over]))
 
     def _over_one(self, start: Array, end: Array, over: Array) -> Way | None:
-        over = over[self.check.room(over) >= self.check.need]
+        over = over[self.check.smallest_distance(over) >= self.check.need]
         long = np.abs(over - start).max(axis=1, initial=0.0) + np.abs(end - over).max(axis=1, initial=0.0)
         over = over[np.argsort(long.round(9), kind="stable")]
         for few in (over[k : k + _TOGETHER] for k in range(0, len(over), _TOGETHER)):
-            there = self.check.ways(np.broadcast_to(start, few.shape), few)
-            left = np.flatnonzero(there.clear)
+            outward = self.check.ways(np.broadcast_to(start, few.shape), few)
+            left = np.flatnonzero(outward.clear)
             on = self.check.ways(few[left], np.broadcast_to(end, few[left].shape))
             if on.clear.any():
                 k = int(np.argmax(on.clear))
-                return Way(few[left[k]][None], float(min(there.room[left[k]], on.room[k])))
+                return Way(few[left[k]][None], float(min(outward.distance[left[k]], on.distance[k])))
         return None
 
-    def _over_roomy(self, start: Array) -> Way | None:
-        """Return a way home over a configuration with much room, from which the way home is straight."""
-        roomy, ways = self._with_room()
-        if not len(roomy):
+    def _over_far(self, start: Array) -> Way | None:
+        """Return a way home over a configuration far from everything, from which the way home is straight."""
+        far, ways = self._far_configurations()
+        if not len(far):
             return None
-        nearest = np.argsort(np.abs(roomy - start).max(axis=1), kind="stable")
-        there = self.check.ways(np.broadcast_to(start, roomy.shape), roomy[nearest])
-        for k in np.flatnonzero(there.clear):
+        nearest = np.argsort(np.abs(far - start).max(axis=1), kind="stable")
+        outward = self.check.ways(np.broadcast_to(start, far.shape), far[nearest])
+        for k in np.flatnonzero(outward.clear):
             on = ways[nearest[k]]
-            return Way(np.concatenate([roomy[nearest[k]][None], on.over]), min(float(there.room[k]), on.room))
+            return Way(np.concatenate([far[nearest[k]][None], on.over]), min(float(outward.distance[k]), on.distance))
         return None
 
-    def _with_room(self) -> tuple[Array, list[Way]]:
-        """Return configurations with much room, and their ways home."""
-        if self._roomy is None:
+    def _far_configurations(self) -> tuple[Array, list[Way]]:
+        """Return configurations far from everything, and their ways home."""
+        if self._far is None:
             drawn = np.random.default_rng(0).uniform(self.low, self.high, (_DRAWN, len(self.low)))
-            room = self.check.room(drawn)
-            most = np.argsort(-room, kind="stable")[:_ROOMY]
-            most = most[room[most] >= self.check.need]
+            distance = self.check.smallest_distance(drawn)
+            most = np.argsort(-distance, kind="stable")[:_MOST_FAR]
+            most = most[distance[most] >= self.check.need]
             at = drawn[most]
             ways = self._straight(at, np.broadcast_to(self.home, at.shape))
             known = [(k, way) for k, way in enumerate(ways) if way is not None]
-            self._roomy = at[[k for k, _ in known]], [way for _, way in known]
-        return self._roomy
-
-
-def touched(check: CollisionCheck, joints: Array) -> tuple[int, float, str] | None:
-    """Return where a row of configurations ``(n, joints)``, driven one after the other, comes too near to something.
-
-    Returns:
-        The number of the move (0 from the first to the second), the room there [m], and what comes near what; None if
-        the clearance is kept all the way.
-    """
-    starts, ends = (joints[:-1], joints[1:]) if len(joints) > 1 else (joints, joints)
-    looked = check.ways(starts, ends)
-    failed = np.flatnonzero(looked.room < check.cell.clearance)
-    if not len(failed):
-        return None
-    k = int(failed[0])
-    return k, float(looked.room[k]), check.words(int(looked.worst[k]))
+            self._far = at[[k for k, _ in known]], [way for _, way in known]
+        return self._far
 
 
 #: So many times as many as are wanted are drawn at most, but no more than this where twice as many are enough.
@@ -197,13 +181,13 @@ def drawn_clear(finder: WayFinder, count: int, approach: Array, rng: np.random.G
         home = np.broadcast_to(finder.home, q.shape)
         ways = finder.check.ways(q, home).clear
         straight, clear = np.concatenate([straight, q[ways]]), np.concatenate([clear, q])
-    found = straight if 2 * len(straight) >= len(clear) else clear
-    made = Drawn(found[:count], drawn, count, lost)
+    configurations = straight if 2 * len(straight) >= len(clear) else clear
+    result = Drawn(configurations[:count], drawn, count, lost)
     if not len(clear):
         raise InputError(
             "there is no configuration in which the arm keeps clear",
             parameter="clearance",
-            came=f"{drawn} drawn; rejected by {made.words}",
+            came=f"{drawn} drawn; rejected by {result.words}",
             cure="Lower `clearance`, or see that the limits, the floor and boxes to keep out of leave the arm room.",
         )
-    return made
+    return result

@@ -118,9 +118,9 @@ class _Place(_Entry):
 
     @model_validator(mode="after")
     def _one_orientation(self) -> _Place:
-        given = [name for name in _ORIENTATIONS if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise InputError("one orientation belongs here", came=" and ".join(given), allowed=", ".join(_ORIENTATIONS))
+        forms = [name for name in _ORIENTATIONS if getattr(self, name) is not None]
+        if len(forms) > 1:
+            raise InputError("one orientation belongs here", came=" and ".join(forms), allowed=", ".join(_ORIENTATIONS))
         return self
 
 
@@ -226,7 +226,7 @@ def read_wrenches(path: Path) -> tuple[TargetWrench, ...]:
         InputError: If the file is not of the schema, or has no wrenches; one has no unit, acts nowhere, or is in no
             known frame.
     """
-    content, made = _file(path, "wrenches"), []
+    content, wrenches = _file(path, "wrenches"), []
     units = content.units
     for number, entry in enumerate(content.wrenches, 1):
         where = f"{path}, wrenches[{number}]"
@@ -234,20 +234,20 @@ def read_wrenches(path: Path) -> tuple[TargetWrench, ...]:
             raise InputError("targets or tools belong here", where=where, cure="Name those at which the force acts.")
         parts = {}
         for name, unit, known in (("force", units.force, FORCE_UNITS), ("moment", units.moment, MOMENT_UNITS)):
-            given = getattr(entry, name)
-            if any(given) and unit is None:
+            components = getattr(entry, name)
+            if any(components) and unit is None:
                 raise InputError(
                     f"no unit of a {name} is given",
                     where=f"{path}, units.{name}",
                     allowed="N, kN, lbf" if name == "force" else "N m, N mm",
                     cure=f"Write units: {{.., {name}: {next(iter(known))}}}.",
                 )
-            x, y, z = (value * (1.0 if unit is None else known[unit]) for value in given)
+            x, y, z = (value * (1.0 if unit is None else known[unit]) for value in components)
             parts[name] = (x, y, z)
         with refusals_at(where):
             wrench = Wrench(parts["force"], parts["moment"], entry.frame)  # type: ignore[arg-type]
-        made.append(TargetWrench(tuple(entry.targets), tuple(entry.tools), wrench, where))
-    return tuple(made)
+        wrenches.append(TargetWrench(tuple(entry.targets), tuple(entry.tools), wrench, where))
+    return tuple(wrenches)
 
 
 def refuse_wrenches_left_out(path: Path | None, parameter: str) -> None:
@@ -289,15 +289,15 @@ def read_answers(files: Mapping[str, Path | None]) -> Answers:
             content = read_yaml(path, CellFile)
         if content.taught is not None:
             taught[tuple(content.taught)] = path
-        if (said := content.controller_kinematics) is not None:
-            kinematics[said if said in STATED else str(path.parent / said)] = path
-    for name, given in (("taught", taught), ("controller_kinematics", kinematics)):
-        if len(given) > 1:
+        if (stated := content.controller_kinematics) is not None:
+            kinematics[stated if stated in STATED else str(path.parent / stated)] = path
+    for name, path_by_answer in (("taught", taught), ("controller_kinematics", kinematics)):
+        if len(path_by_answer) > 1:
             raise InputError(
                 "two files answer this differently",
-                where=f"{list(given.values())[1]}, {name}",
-                came=list(given)[1],
-                allowed=f"{next(iter(given))}, as {next(iter(given.values()))} says",
+                where=f"{list(path_by_answer.values())[1]}, {name}",
+                came=list(path_by_answer)[1],
+                allowed=f"{next(iter(path_by_answer))}, as {next(iter(path_by_answer.values()))} says",
                 cure="Take one of the entries out.",
             )
     return Answers(next(iter(taught), None), next(iter(kinematics), None))
@@ -312,20 +312,20 @@ def _file(path: Path, part: str) -> CellFile:
 
 
 def _tools(robot: Robot, path: Path, content: CellFile, flange: Sequence[str]) -> dict[str, Placed]:
-    made: dict[str, Placed] = {}
+    tools: dict[str, Placed] = {}
     keys = _keys(content.tools, flange, f"{path}, tools")
     for name, entry in content.tools.items():
         where = f"{path}, tools.{name}"
         if entry.target is not None and entry.of == "controller":
             raise InputError("a target is on the identified flange", where=where, came="of: controller")
         place, _ = _tool_place(robot, entry, content.units, where)
-        made[keys[name]] = _placed(entry.of, place, entry.controller, content.units, where)
-        _refuse_moved(keys[name], made[keys[name]], "flange", where)
-    return made
+        tools[keys[name]] = _placed(entry.of, place, entry.controller, content.units, where)
+        _refuse_moved(keys[name], tools[keys[name]], "flange", where)
+    return tools
 
 
 def _frames(robot: Robot, path: Path, content: CellFile, base: Sequence[str]) -> dict[str, Placed]:
-    made: dict[str, Placed] = {}
+    frames: dict[str, Placed] = {}
     keys = _keys(content.frames, base, f"{path}, frames")
     for name, entry in content.frames.items():
         where = f"{path}, frames.{name}"
@@ -333,14 +333,14 @@ def _frames(robot: Robot, path: Path, content: CellFile, base: Sequence[str]) ->
         if entry.of == "world":
             in_base = np.linalg.inv(robot.base.matrix) @ place.matrix
             place = Transform.from_matrix(in_base[:3, :3], in_base[:3, 3])
-        made[keys[name]] = _placed(entry.of, place, entry.controller, content.units, where)
-        _refuse_moved(keys[name], made[keys[name]], "base", where)
-    return made
+        frames[keys[name]] = _placed(entry.of, place, entry.controller, content.units, where)
+        _refuse_moved(keys[name], frames[keys[name]], "base", where)
+    return frames
 
 
 def _keys(names: Iterable[str], own: Sequence[str], where: str) -> dict[str, str]:
     """Return the key of each name: the name in small letters, and nothing for the names of the flange or the base."""
-    made: dict[str, str] = {}
+    keys: dict[str, str] = {}
     called: dict[str, str] = {}
     for name in names:
         key = "" if name.lower() in own else name.lower()
@@ -353,8 +353,8 @@ def _keys(names: Iterable[str], own: Sequence[str], where: str) -> dict[str, str
                 came=f"{before} and {name}",
                 cure="Large and small letters are the same here." if alike else "Both names mean it: keep one entry.",
             )
-        made[name] = key
-    return made
+        keys[name] = key
+    return keys
 
 
 def _refuse_moved(key: str, placed: Placed, own: str, where: str) -> None:
@@ -391,9 +391,9 @@ def _tool_place(robot: Robot, entry: _Tool, units: _Units, where: str) -> tuple[
 def _transform(place: _Place, units: _Units, where: str) -> Transform:
     x, y, z = (sized_si(v, units.length, f"{where}.translation") for v in place.translation)
     for name, orientation in _ORIENTATIONS.items():
-        given = getattr(place, name)
-        if given is not None:
-            numbers = given if name == "quaternion" else [sized_si(v, units.angle, f"{where}.{name}") for v in given]
+        parts = getattr(place, name)
+        if parts is not None:
+            numbers = parts if name == "quaternion" else [sized_si(v, units.angle, f"{where}.{name}") for v in parts]
             return Transform.from_matrix(orientation.matrices(np.array([numbers]))[0], np.array([x, y, z]))
     return Transform((x, y, z))
 
@@ -421,7 +421,7 @@ def read_known_places(robot: Robot, path: Path) -> tuple[dict[str, KnownPlace], 
     content = read_yaml(path, CellFile)
     tools: dict[str, KnownPlace] = {}
     frames: dict[str, KnownPlace] = {}
-    for part, entries, found in (("tools", content.tools, tools), ("frames", content.frames, frames)):
+    for part, entries, places in (("tools", content.tools, tools), ("frames", content.frames, frames)):
         for name, entry in entries.items():
             where = f"{path}, {part}.{name}"
             if entry.of == "controller":
@@ -437,5 +437,5 @@ def read_known_places(robot: Robot, path: Path) -> tuple[dict[str, KnownPlace], 
             else:
                 place = _transform(entry, content.units, where)
                 turned = bool(entry.model_fields_set & {*_ORIENTATIONS})
-            found[name] = KnownPlace(entry.of, place, turned, where)
+            places[name] = KnownPlace(entry.of, place, turned, where)
     return tools, frames

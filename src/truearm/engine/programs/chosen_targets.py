@@ -25,7 +25,7 @@ class Question:
     parameter: str  #: Of the job, which answers it.
     text: str  #: The question, and why it is asked.
     answers: str  #: How the parameter answers it.
-    kept: str  #: Where an answer can be kept, in a sentence.
+    stored: str  #: Where an answer can be kept, in a sentence.
 
 
 def refuse_unanswered(questions: Iterable[Question | None]) -> None:
@@ -37,7 +37,7 @@ def refuse_unanswered(questions: Iterable[Question | None]) -> None:
     asked = [question for question in questions if question is not None]
     if not asked:
         return
-    texts = [f"{one.text} Answer with {one.answers}. {one.kept}" for one in asked]
+    texts = [f"{question.text} Answer with {question.answers}. {question.stored}" for question in asked]
     raise InputError(
         "nothing is corrected before this is answered",
         parameter=", ".join(question.parameter for question in asked),
@@ -76,9 +76,9 @@ class Choice:
     #: Whether targets are corrected that would rather get worse, see :mod:`truearm.engine.programs.correction`.
     every: bool = False
 
-    def was_taught(self, what: Taught) -> bool:
+    def was_taught(self, kind: Taught) -> bool:
         """Return whether something is said to be taught."""
-        return self.taught is not None and what in self.taught
+        return self.taught is not None and kind in self.taught
 
 
 EVERY_POSE: Final = Choice()
@@ -92,7 +92,7 @@ def kept_by_choice(programs: Sequence[Program], choice: Choice) -> list[dict[int
     Raises:
         InputError: If a name or pattern fits no target.
     """
-    only, keep = (Patterns(programs, given, name) for given, name in ((choice.only, "only"), (choice.keep, "keep")))
+    only, keep = (Patterns(programs, texts, name) for texts, name in ((choice.only, "only"), (choice.keep, "keep")))
     return [
         {
             row: why
@@ -105,8 +105,8 @@ def kept_by_choice(programs: Sequence[Program], choice: Choice) -> list[dict[int
 
 def taught_question(programs: Sequence[Program], choice: Choice) -> Question | None:
     """Return what to ask where nobody has said what was taught, and there is something to correct."""
-    kept = kept_by_choice(programs, choice)
-    nothing = all(len(rows) == len(program.targets) for program, rows in zip(programs, kept, strict=True))
+    kept_rows = kept_by_choice(programs, choice)
+    nothing = all(len(rows) == len(program.targets) for program, rows in zip(programs, kept_rows, strict=True))
     if choice.taught is not None or nothing:
         return None
     return Question(
@@ -136,7 +136,7 @@ class Patterns:
 
     Args:
         programs: Whose targets they are.
-        given: The names and patterns.
+        texts: The names and patterns.
         parameter, where: What a refusal names.
 
     Raises:
@@ -144,15 +144,15 @@ class Patterns:
     """
 
     def __init__(
-        self, programs: Sequence[Program], given: Iterable[str], parameter: str, where: str | None = None
+        self, programs: Sequence[Program], texts: Iterable[str], parameter: str, where: str | None = None
     ) -> None:
         names = {target.name for program in programs for target in program.targets if target.name}
         self._names: set[str] = set()
-        for text in given:
+        for text in texts:
             # P[3] is a name of FANUC, and no pattern
             wanted = re.compile(translate(text.replace("[", "[[]")), re.IGNORECASE)
-            found = {name for name in names if wanted.match(name) or wanted.match(_COMMENT.sub("", name))}
-            if not found:
+            matched = {name for name in names if wanted.match(name) or wanted.match(_COMMENT.sub("", name))}
+            if not matched:
                 raise InputError(
                     "no target of the programs has this name",
                     parameter=parameter,
@@ -161,7 +161,7 @@ class Patterns:
                     allowed="a name as the program writes it, or a pattern such as pHole*",
                     cure=did_you_mean(text, sorted(names)),
                 )
-            self._names |= found
+            self._names |= matched
 
     def fit(self, name: str) -> bool:
         """Return whether a target of this name was meant."""
@@ -172,7 +172,9 @@ class Patterns:
 _FLANGE: Final = "flange"
 
 
-def wrenches_of_targets(programs: Sequence[Program], given: Sequence[TargetWrench]) -> list[tuple[Wrench | None, ...]]:
+def wrenches_of_targets(
+    programs: Sequence[Program], target_wrenches: Sequence[TargetWrench]
+) -> list[tuple[Wrench | None, ...]]:
     """Return what acts at each target of each program; None where nothing does.
 
     What names a target holds before what names its tool alone, and that before what names neither.
@@ -180,9 +182,9 @@ def wrenches_of_targets(programs: Sequence[Program], given: Sequence[TargetWrenc
     Raises:
         InputError: If a name fits no target or no tool of the programs, or two entries of one kind fit one target.
     """
-    fits = [Patterns(programs, one.targets, "wrench", one.where or None) for one in given]
+    fits = [Patterns(programs, entry.targets, "wrench", entry.where or None) for entry in target_wrenches]
     used = {target.tool.lower() for program in programs for target in program.targets}
-    for target_wrench in given:
+    for target_wrench in target_wrenches:
         for tool in target_wrench.tools:
             if _key(tool) not in used:
                 names = sorted(name or _FLANGE for name in used)
@@ -194,12 +196,12 @@ def wrenches_of_targets(programs: Sequence[Program], given: Sequence[TargetWrenc
                     allowed=", ".join(names),
                     cure=did_you_mean(tool, names),
                 )
-    found = []
+    wrenches = []
     for program in programs:
         of_program: list[Wrench | None] = []
         for target in program.targets:
             best: dict[int, TargetWrench] = {}
-            for target_wrench, patterns in zip(given, fits, strict=True):
+            for target_wrench, patterns in zip(target_wrenches, fits, strict=True):
                 if target_wrench.targets and not patterns.fit(target.name):
                     continue
                 if target_wrench.tools and target.tool.lower() not in map(_key, target_wrench.tools):
@@ -215,8 +217,8 @@ def wrenches_of_targets(programs: Sequence[Program], given: Sequence[TargetWrenc
                     )
                 best[rank] = target_wrench
             of_program.append(best[min(best)].wrench if best else None)
-        found.append(tuple(of_program))
-    return found
+        wrenches.append(tuple(of_program))
+    return wrenches
 
 
 def _key(tool: str) -> str:
@@ -224,7 +226,7 @@ def _key(tool: str) -> str:
 
 
 #: Programs write a gram where a mass has to be and is not known [kg].
-_NOT_GIVEN: Final = 0.01
+_LEAST_MASS: Final = 0.01
 
 
 def loads_of_tools(robot: Robot, programs: Sequence[Program]) -> dict[str, Payload | None]:
@@ -233,11 +235,11 @@ def loads_of_tools(robot: Robot, programs: Sequence[Program]) -> dict[str, Paylo
     By the name of the tool as targets write it; None for a tool without a mass, and for one to which two programs give
     different ones.
     """
-    found: dict[str, Payload | None] = {}
-    for tool, load in _said(programs):
-        here = None if load is None or load.mass < _NOT_GIVEN else _in_flange(robot, load)
-        found[tool] = here if found.get(tool, here) == here else None
-    return found
+    loads: dict[str, Payload | None] = {}
+    for tool, load in _stated_loads(programs):
+        in_flange = None if load is None or load.mass < _LEAST_MASS else _in_flange(robot, load)
+        loads[tool] = in_flange if loads.get(tool, in_flange) == in_flange else None
+    return loads
 
 
 def arms_of_tools(robot: Robot, loads: Mapping[str, Payload | None]) -> dict[str, Robot]:
@@ -248,7 +250,7 @@ def arms_of_tools(robot: Robot, loads: Mapping[str, Payload | None]) -> dict[str
     return {tool: arms[load] for tool, load in loads.items()}
 
 
-def _said(programs: Sequence[Program]) -> Iterator[tuple[str, Payload | None]]:
+def _stated_loads(programs: Sequence[Program]) -> Iterator[tuple[str, Payload | None]]:
     for program in programs:
         loads = {name.lower(): load for name, load in program.loads.items()}
         for tool in dict.fromkeys(target.tool for target in program.targets):

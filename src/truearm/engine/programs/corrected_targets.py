@@ -37,9 +37,9 @@ _SCHEMA: Final = "truearm-corrections/1"
 #: Bytes of a digest: among a million targets, two that differ have the same one once in 300 million cases.
 _SIZE: Final = 6
 #: So many digests are kept of a program, the smallest: a sample that any other program can be compared with.
-_KEPT: Final = 1000
+_MOST: Final = 1000
 #: A program is corrected already if one of so many of its targets is: single points of a dense path may coincide.
-_ONE_OF: Final = 20
+_ONE_IN: Final = 20
 #: Beyond this part of a step, a number that was written with other decimals may be rounded to the next one.
 _NEAR: Final = 0.45
 
@@ -91,7 +91,7 @@ def corrected_digests(original: Iterable[ProgramTarget], corrected: Iterable[Pro
     """Return the digests of the targets of a corrected program that its original does not have."""
     old = {digest for target in original if target.parent is None for digest in _digests(target)}
     new = {_digests(target)[0] for target in corrected if target.parent is None} - old
-    return base64.b64encode(b"".join(sorted(new)[:_KEPT])).decode()
+    return base64.b64encode(b"".join(sorted(new)[:_MOST])).decode()
 
 
 def refuse_corrected(corrections: Sequence[Correction], known: Sequence[KnownCorrection]) -> None:
@@ -101,7 +101,7 @@ def refuse_corrected(corrections: Sequence[Correction], known: Sequence[KnownCor
         InputError: If at least one of twenty targets that would be corrected in a file is among those of a known
             program.
     """
-    entries = [(one, _unpacked(one.targets)) for one in known if one.targets]
+    entries = [(other, _unpacked(other.targets)) for other in known if other.targets]
     for correction in corrections if entries else ():
         for number, source in enumerate(correction.program.sources):
             lines: dict[bytes, int] = {}
@@ -111,14 +111,14 @@ def refuse_corrected(corrections: Sequence[Correction], known: Sequence[KnownCor
                     digests = _digests(target)
                     own.append(digests[0])
                     lines |= dict.fromkeys(digests, target.line)
-            for one, digests_of_one in entries:
-                found = {lines[digest] for digest in digests_of_one if digest in lines}
-                last = digests_of_one[-1] if len(digests_of_one) == _KEPT else b"\xff" * _SIZE
-                if found and _ONE_OF * len(found) >= sum(digest <= last for digest in own):
+            for other, digests_of_other in entries:
+                matched_lines = {lines[digest] for digest in digests_of_other if digest in lines}
+                last = digests_of_other[-1] if len(digests_of_other) == _MOST else b"\xff" * _SIZE
+                if matched_lines and _ONE_IN * len(matched_lines) >= sum(digest <= last for digest in own):
                     raise InputError(
                         "this program was corrected already",
-                        where=source.where(min(found)),
-                        came=f"targets of {one.program} as it was corrected{_on(one.date)}, says {one.where}",
+                        where=source.where(min(matched_lines)),
+                        came=f"targets of {other.program} as it was corrected{_on(other.date)}, says {other.where}",
                         cure="Give the original, or leave these targets as they are with `keep`.",
                     )
 
@@ -144,7 +144,7 @@ def _digests(target: ProgramTarget) -> list[bytes]:
         nearest = round(value / step)
         off = value / step - nearest
         steps.append((nearest, nearest + (1 if off > 0.0 else -1)) if abs(off) > _NEAR else (nearest,))
-    return [blake2b(f"{form.kind}{one}".encode(), digest_size=_SIZE).digest() for one in product(*steps)]
+    return [blake2b(f"{form.kind}{key}".encode(), digest_size=_SIZE).digest() for key in product(*steps)]
 
 
 # -- the ledger -------------------------------------------------------------------------------------------
@@ -161,12 +161,12 @@ def known_by_ledger(ledger: Path) -> list[KnownCorrection]:
     Raises:
         InputError: If what has the name of the ledger is none.
     """
-    found = [*_known(ledger)]
+    corrections = [*_known(ledger)]
     beside = {other.resolve() for other in ledger.parent.parent.glob(f"*/{LEDGER}")}
     for other in sorted(beside - {ledger.resolve()}):
         with suppress(InputError):  # of another robot, perhaps
-            found += _known(other)
-    return found
+            corrections += _known(other)
+    return corrections
 
 
 def _known(ledger: Path) -> list[KnownCorrection]:
@@ -183,11 +183,11 @@ def remember(ledger: Path, programs: Sequence[LedgerEntry]) -> None:
     while True:
         content = read_bytes(ledger) if exists(ledger) else None
         entries = _entries(content, ledger)
-        here = {entry.targets for entry in entries}
-        new = [program for program in programs if program.targets and program.targets not in here]
+        known_targets = {entry.targets for entry in entries}
+        new = [program for program in programs if program.targets and program.targets not in known_targets]
         if not new:
             return
-        text = json.dumps({"truearm": _SCHEMA, "programs": [one.model_dump() for one in (*entries, *new)]}, indent=1)
+        text = json.dumps({"truearm": _SCHEMA, "programs": [p.model_dump() for p in (*entries, *new)]}, indent=1)
         try:
             write_text_over(ledger, text + "\n", None if content is None else hash_of(content))
         except InputError:

@@ -149,10 +149,10 @@ def kept_targets(program: Program, moved: Array, expected: ExpectedErrors) -> ND
     paths = paths_of(program)
     count = int(paths.max(initial=-1)) + 1
     judged = np.isfinite(expected.worse)
-    kept = judged & (np.nan_to_num(expected.worse) > LIKELY)
+    unchanged = judged & (np.nan_to_num(expected.worse) > LIKELY)
     offsets = [row for row, target in enumerate(program.targets) if target.parent is not None]
-    step = np.bincount(paths, kept & (moved > LARGEST_STEP), count) > 0
+    step = np.bincount(paths, unchanged & (moved > LARGEST_STEP), count) > 0
     step[paths[offsets]] = True
-    mixed = step & (np.bincount(paths, kept, count) > 0) & (np.bincount(paths, judged & ~kept, count) > 0)
+    mixed = step & (np.bincount(paths, unchanged, count) > 0) & (np.bincount(paths, judged & ~unchanged, count) > 0)
     together = np.nan_to_num(expected.group_worse) > LIKELY
-    return np.where(mixed[paths], judged & together, kept)
+    return np.where(mixed[paths], judged & together, unchanged)

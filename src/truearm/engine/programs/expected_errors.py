@@ -107,10 +107,10 @@ class DrawnErrors:
             corrected: Which of all targets are, ``(n,)``.
             among: Which of all targets count, ``(n,)``.
         """
-        mine = among[self.rows]
-        if not mine.any():
+        selected = among[self.rows]
+        if not selected.any():
             return None
-        lengths = np.where(corrected[self.rows][mine, None], self.after[mine], self.before[mine])
+        lengths = np.where(corrected[self.rows][selected, None], self.after[selected], self.before[selected])
         low, high = np.percentile(lengths.mean(axis=0), _INTERVAL)
         return float(low), max(float(high), REPEATABILITY)
 
@@ -267,13 +267,13 @@ class _ModelErrors:
             moved, _, tips = self._motions(robot, targets.joints[rows], tip)
             by_joints = self._by_joints(robot, targets.joints[rows], tip)
             for number, common in self.shared.items():
-                mine = (targets.frames[rows] == number) & targets.alone[rows]
-                moved[mine] -= common.of(tips[mine])
+                in_frame = (targets.frames[rows] == number) & targets.alone[rows]
+                moved[in_frame] -= common.of(tips[in_frame])
             if targets.start is not None:
                 start = targets.start.some(rows)
                 on, turned = start.anchored[:, None, None], start.turned[:, None, None]
-                before, turn, from_there = self._motions(robot, start.joints, tip)
-                moved -= on * (before + turned * np.cross(turn, (tips - from_there)[:, :, None], axis=-2))
+                before, turn, start_tips = self._motions(robot, start.joints, tip)
+                moved -= on * (before + turned * np.cross(turn, (tips - start_tips)[:, :, None], axis=-2))
                 by_joints = np.concatenate([by_joints, on * self._by_joints(robot, start.joints, tip)], axis=2)
             yield rows, moved, by_joints
 
@@ -285,11 +285,11 @@ class _ModelErrors:
     def _motions_in(self, programs: Sequence[TargetsReached], number: int) -> Iterator[tuple[Array, Array, Array]]:
         for targets in programs:
             for rows in _parts(targets):
-                mine = rows[(targets.frames[rows] == number) & targets.alone[rows]]
-                if len(mine):
+                members = rows[(targets.frames[rows] == number) & targets.alone[rows]]
+                if len(members):
                     # A frame takes up what is wrong with the arm at rest; what acts on the tool moves no frame.
-                    robot = targets.arms[targets.arm[mine[0]]].with_wrench(None)
-                    moved, turned, tips = self._motions(robot, targets.joints[mine], targets.tips[mine])
+                    robot = targets.arms[targets.arm[members[0]]].with_wrench(None)
+                    moved, turned, tips = self._motions(robot, targets.joints[members], targets.tips[members])
                     yield tips, moved, turned
 
     def _motions(self, robot: Robot, q: Array, tip: Array) -> tuple[Array, Array, Array]:
@@ -338,6 +338,6 @@ class _ModelErrors:
 def _parts(targets: TargetsReached) -> Iterator[NDArray[np.intp]]:
     """Go through the targets in parts, each of them with one load."""
     for number in range(len(targets.arms)):
-        mine = np.flatnonzero(targets.arm == number)
-        for first in range(0, len(mine), _AT_ONCE):
-            yield mine[first : first + _AT_ONCE]
+        rows = np.flatnonzero(targets.arm == number)
+        for first in range(0, len(rows), _AT_ONCE):
+            yield rows[first : first + _AT_ONCE]

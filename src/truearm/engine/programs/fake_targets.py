@@ -132,31 +132,31 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     )
 
 
-def fake_targets_of(robots: Sequence[Robot], which: NDArray[np.intp], flange: Array, near: Array) -> FakeTargets:
+def fake_targets_of(robots: Sequence[Robot], robot_of_row: NDArray[np.intp], flange: Array, near: Array) -> FakeTargets:
     """Return the fake targets of wanted poses, for one calibrated robot with several loads.
 
     Args:
         robots: The robot with each load.
-        which: Index of the robot for each pose, ``(n,)``; `flange` and `near` as for :func:`fake_targets`.
+        robot_of_row: Index of the robot of each pose, ``(n,)``; `flange` and `near` as for :func:`fake_targets`.
     """
     if len(robots) == 1:
         return fake_targets(robots[0], flange, near)
     fakes, parts = np.empty_like(flange), []
-    for number in np.unique(which).tolist():
-        rows = np.flatnonzero(which == number)
-        found = fake_targets(robots[number], flange[rows], near[rows])
-        fakes[rows] = found.flange
-        parts.append((rows, found.solutions))
+    for number in np.unique(robot_of_row).tolist():
+        rows = np.flatnonzero(robot_of_row == number)
+        fake = fake_targets(robots[number], flange[rows], near[rows])
+        fakes[rows] = fake.flange
+        parts.append((rows, fake.solutions))
     return FakeTargets(fakes, _merged(parts, len(flange)))
 
 
 def _better(
-    found: JointSolutions, again: JointSolutions, rows: NDArray[np.intp], near: Array, on_branch: _OnBranch
+    solutions: JointSolutions, again: JointSolutions, rows: NDArray[np.intp], near: Array, on_branch: _OnBranch
 ) -> JointSolutions:
     """Return solutions with others in their place that are on the branch where they are not, or can be used.
 
     Args:
-        found: One solution a pose.
+        solutions: One solution a pose.
         again, rows: Others, and the pose of each.
         near: Joints to be near to, of every pose.
         on_branch: Whether solutions of poses are on the branch of these.
@@ -165,25 +165,25 @@ def _better(
     away = np.abs(again.joints - near[rows]).max(axis=1)
     order = np.lexsort((away, ~usable, ~agrees, rows))
     best = order[np.unique(rows[order], return_index=True)[1]]
-    now = _picked(found, rows[best])
-    known, worked = on_branch(now, rows[best]), now.usable
+    current = _picked(solutions, rows[best])
+    known, worked = on_branch(current, rows[best]), current.usable
     best = best[agrees[best] & ~(known & worked) & (usable[best] | ~known)]
-    return _merged([(np.arange(len(near)), found), (rows[best], _picked(again, best))], len(near))
+    return _merged([(np.arange(len(near)), solutions), (rows[best], _picked(again, best))], len(near))
 
 
-def _picked(found: JointSolutions, rows: NDArray[np.intp]) -> JointSolutions:
+def _picked(solutions: JointSolutions, rows: NDArray[np.intp]) -> JointSolutions:
     """Return some solutions, one a pose."""
     return replace(
-        found,
+        solutions,
         poses=len(rows),
         pose=np.arange(len(rows)),
-        joints=found.joints[rows],
-        status=tuple(found.status[row] for row in rows.tolist()),
-        branch=tuple(found.branch[row] for row in rows.tolist()),
-        position_error=found.position_error[rows],
-        orientation_error=found.orientation_error[rows],
-        beyond=found.beyond[rows],
-        singular_value=found.singular_value[rows],
+        joints=solutions.joints[rows],
+        status=tuple(solutions.status[row] for row in rows.tolist()),
+        branch=tuple(solutions.branch[row] for row in rows.tolist()),
+        position_error=solutions.position_error[rows],
+        orientation_error=solutions.orientation_error[rows],
+        beyond=solutions.beyond[rows],
+        singular_value=solutions.singular_value[rows],
     )
 
 
@@ -193,7 +193,7 @@ def _merged(parts: list[tuple[NDArray[np.intp], JointSolutions]], count: int) ->
     for rows, _ in parts:
         place[rows] = offset + np.arange(len(rows))
         offset += len(rows)
-    every = [found for _, found in parts]
+    every = [solutions for _, solutions in parts]
 
     def joined(arrays: list[Array]) -> Array:
         return np.asarray(np.concatenate(arrays)[place])

@@ -45,7 +45,7 @@ _TOOL: Final = 1e-3
 #: Share of its prior variance up to which a combination of parameters was told by a calibration; so many of them say
 #: how accurate an arm is.
 _MOST_LEFT: Final = 0.1
-_LEAST_TOLD: Final = 4
+_LEAST_DETERMINED: Final = 4
 
 
 def best_agreement(robot: Robot) -> tuple[Array, Array]:
@@ -60,43 +60,43 @@ def best_agreement(robot: Robot) -> tuple[Array, Array]:
     Returns:
         base, flange: ``T_base_nominalbase`` and ``T_flange_nominalflange``, ``(4, 4)`` each [m].
     """
-    base, flange, _ = _agreement(robot, nominal_robot(robot), not base_is_held(robot), _flange_freedom(robot))
+    base, flange, _ = _agreement(robot, nominal_robot(robot), not base_fixed(robot), _flange_freedom(robot))
     return base, flange
 
 
-def base_is_held(robot: Robot) -> bool:
+def base_fixed(robot: Robot) -> bool:
     """Return whether the calibration of a robot held its base."""
     return robot.proof is not None and BASE in robot.proof.held
 
 
-def flange_is_held(robot: Robot) -> bool:
+def flange_fixed(robot: Robot) -> bool:
     """Return whether targets that the calibration of a robot held say where its flange is."""
     return robot.proof is not None and not _flange_freedom(robot).shape[1]
 
 
-def held_by(fit: Fit) -> tuple[str, ...]:
+def fixed_by(fit: Fit) -> tuple[str, ...]:
     """Return how a proof says what a fit has held."""
-    held = fit.held.names(fit.robot)
+    held = fit.fixed.names(fit.robot)
     targets = [name for name in held if fit.robot.parameters[name].group == "target"]
-    found = [BASE] if fit.held.base is not None else []
+    names = [BASE] if fit.fixed.base is not None else []
     if not _freedom_beside(fit.robot, targets).shape[1]:
-        found.append(FLANGE)
-    return (*found, *targets)
+        names.append(FLANGE)
+    return (*names, *targets)
 
 
 def _flange_freedom(robot: Robot) -> Array:
     """Return the motions of a flange that leave the targets held on it where they are, ``(6, k)``."""
-    held = () if robot.proof is None else robot.proof.held
-    return np.zeros((6, 0)) if FLANGE in held else _freedom_beside(robot, held)
+    fixed = () if robot.proof is None else robot.proof.held
+    return np.zeros((6, 0)) if FLANGE in fixed else _freedom_beside(robot, fixed)
 
 
-def _freedom_beside(robot: Robot, held: Sequence[str]) -> Array:
+def _freedom_beside(robot: Robot, fixed: Sequence[str]) -> Array:
     rows = [np.zeros((1, 6))]
     for target in robot.targets:
-        if target.parameter("x") in held:
+        if target.parameter("x") in fixed:
             x, y, z = (robot.values[target.parameter(axis)] for axis in "xyz")
             rows.append(np.column_stack([np.eye(3), [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]]))
-        if target.parameter("rx") in held:
+        if target.parameter("rx") in fixed:
             rows.append(np.eye(3, 6, 3))
     _, s, Vt = np.linalg.svd(np.concatenate(rows), full_matrices=True)
     return np.asarray(Vt[int((s > _RANK).sum()) :].T)
@@ -149,7 +149,7 @@ def flange_rates(robot: Robot, names: Sequence[str]) -> Array:
     moved = np.concatenate(robot.jacobians(robot.forward_kinematics(joints), joints, names), axis=1)
     moved[[robot.parameters[name].group == "base" for name in names]] = 0.0
     weight = np.repeat([1.0, reach(nominal_robot(robot), None)], 3)
-    freedom, base_moves = _flange_freedom(robot), not base_is_held(robot)
+    freedom, base_moves = _flange_freedom(robot), not base_fixed(robot)
     if not freedom.shape[1]:
         return np.zeros((6, len(names)))
     rows = np.concatenate([_by_base(poses)[:, :, : 6 * base_moves], _by_flange(poses) @ freedom], axis=2)
@@ -175,8 +175,8 @@ def flange_spread(robot: Robot, *, taught: bool = False) -> Array:
         spread: ``(6, 6)``: translation and rotation vector of the flange in its own axes [m, rad], by independent
             numbers of deviation 1, one for each; see :func:`flange_draws`.
     """
-    length, angle = _found_accuracy(robot, "geometry", "m"), _found_accuracy(robot, "geometry", "rad")
-    zero = _found_accuracy(robot, "joint zero", "rad")
+    length, angle = _identified_accuracy(robot, "geometry", "m"), _identified_accuracy(robot, "geometry", "rad")
+    zero = _identified_accuracy(robot, "joint zero", "rad")
     size = np.array([length, length, 2.0 * length, angle, angle, 2.0 * zero]) / math.sqrt(2.0)
     freedom = np.eye(6) if taught else _flange_freedom(robot)
     within = (freedom / size[:, None] ** 2).T
@@ -191,7 +191,7 @@ def flange_draws(count: int) -> Array:
     return drawn
 
 
-def _found_accuracy(robot: Robot, group: Group, unit: Unit) -> float:
+def _identified_accuracy(robot: Robot, group: Group, unit: Unit) -> float:
     """Return the deviation from nominal of the parameters of a kind, as far as a calibration told them [m or rad].
 
     It is their prior where the calibration told less than four of them, or nothing is known of how well it did.
@@ -200,15 +200,15 @@ def _found_accuracy(robot: Robot, group: Group, unit: Unit) -> float:
     nominal = nominal_robot(robot).parameters
     names = [] if robot.proof is None else [n for n in robot.proof.names if n in nominal]
     names = [n for n in names if (nominal[n].group, nominal[n].unit) == (group, unit)]
-    if robot.proof is None or len(names) < _LEAST_TOLD:
+    if robot.proof is None or len(names) < _LEAST_DETERMINED:
         return prior
     rows = [robot.proof.names.index(name) for name in names]
     moved = np.array([robot.values[name] - nominal[name].value for name in names]) / prior
     left, axes = np.linalg.eigh(robot.proof.covariance[np.ix_(rows, rows)] / prior**2)
-    told = left < _MOST_LEFT
-    if told.sum() < _LEAST_TOLD:
+    determined = left < _MOST_LEFT
+    if determined.sum() < _LEAST_DETERMINED:
         return prior
-    return prior * max(float(np.sqrt(np.mean((axes[:, told].T @ moved) ** 2))), _RANK)
+    return prior * max(float(np.sqrt(np.mean((axes[:, determined].T @ moved) ** 2))), _RANK)
 
 
 def base_shift(corrected: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
@@ -276,9 +276,9 @@ def common_motion(parts: Iterable[tuple[Array, Array, Array]]) -> CommonMotion:
     return CommonMotion(mean, np.linalg.solve(inertia, turn), middle)
 
 
-def turns_between(one: Array, other: Array) -> Array:
+def turns_between(start: Array, end: Array) -> Array:
     """Return the rotation vectors ``(n, 3)`` [rad], in outer axes, from poses ``(n, 4, 4)`` to others."""
-    return rotation_vector(other[:, :3, :3] @ one[:, :3, :3].swapaxes(1, 2))
+    return rotation_vector(end[:, :3, :3] @ start[:, :3, :3].swapaxes(1, 2))
 
 
 def _by_base(poses: Array) -> Array:
@@ -301,7 +301,7 @@ def _by_flange(poses: Array) -> Array:
 
 def _small(motion: Array) -> Array:
     """Return the transform ``(4, 4)`` of a translation and a rotation vector ``(6,)``."""
-    made = np.eye(4)
-    made[:3, :3] = rotation_from_vector(motion[3:])
-    made[:3, 3] = motion[:3]
-    return made
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation_from_vector(motion[3:])
+    matrix[:3, 3] = motion[:3]
+    return matrix

@@ -98,7 +98,7 @@ _SHARE_OF_BOUND: Final = 0.02
 #: ones, in ranges of the joints; what it finds is taken for less than there is.
 _SEARCHED: Final = 1000
 _NARROWER: Final = (0.1, 0.05, 0.02, 0.01)
-_MORE_THAN_FOUND: Final = 1.03
+_SEARCH_MARGIN: Final = 1.03
 #: Of joints for derivatives [rad or m].
 _NUDGE: Final = 1e-5
 
@@ -155,8 +155,8 @@ def joint_shares(
         share = _leading_share(robot, most, share)
         fast = np.full(len(least), FASTEST)
     leading = float((least / fast).max())
-    said = said_share(share if along <= 0 else min(share, speed * leading / along), language)
-    return said, along * said / leading if leading > 0 else 0.0
+    written = written_share(share if along <= 0 else min(share, speed * leading / along), language)
+    return written, along * written / leading if leading > 0 else 0.0
 
 
 def first_share(robot: Robot, language: str, share: float, speed: float) -> float:
@@ -177,13 +177,13 @@ def first_shares(robot: Robot, language: str, share: float, speed: float) -> tup
     together = np.abs(np.linalg.inv(robot.controller.coupling(len(fast))))
     rates = np.maximum(fast, together @ fast)
     anywhere = _fastest_anywhere(robot, rates)
-    said = said_share(min(share, speed / anywhere), language)
-    if anywhere * said > speed:  # no lower share can be said: see whether the arm could go so fast at all
-        anywhere = min(anywhere, _MORE_THAN_FOUND * _fastest_found(robot, rates))
-    return said, anywhere * said
+    written = written_share(min(share, speed / anywhere), language)
+    if anywhere * written > speed:  # no lower share can be said: see whether the arm could go so fast at all
+        anywhere = min(anywhere, _SEARCH_MARGIN * _fastest_sampled(robot, rates))
+    return written, anywhere * written
 
 
-def said_share(share: float, language: str) -> float:
+def written_share(share: float, language: str) -> float:
     """Return a share as a language says it: no larger, unless it has none so small."""
     finest = _FINEST.get(language, _FINEST_ELSEWHERE)
     return max(math.floor(share / finest + 1e-9), 1) * finest
@@ -293,7 +293,7 @@ def _leading_share(robot: Robot, most: Array, share: float) -> float:
     return share if longest <= 0.0 else share * float(most.max()) / (FASTEST * longest)
 
 
-def _fastest_found(robot: Robot, rates: Array) -> float:
+def _fastest_sampled(robot: Robot, rates: Array) -> float:
     """Return how fast the fastest of the targets and the flange goes with joints of these rates, by a search [m/s]."""
     rng, fastest, count = np.random.default_rng(0), 0.0, len(rates)
     signs = np.array([[1.0, *other] for other in product((-1.0, 1.0), repeat=count - 1)])

@@ -254,16 +254,16 @@ class MotionProgram(NewTargets):
 
     def places(self) -> list[tuple[TargetKind, int]]:
         """Return which targets are used, and as what, in the order in which they are first gone to."""
-        found: dict[tuple[TargetKind, int], None] = {}
+        places: dict[tuple[TargetKind, int], None] = {}
         for step in self.steps:
             if isinstance(step, JointMove):
-                found["joints", step.target] = None
+                places["joints", step.target] = None
             elif isinstance(step, CircleMove):
-                found["pose", step.via] = None
-                found["pose", step.target] = None
+                places["pose", step.via] = None
+                places["pose", step.target] = None
             elif isinstance(step, StraightMove):
-                found["pose", step.target] = None
-        return list(found)
+                places["pose", step.target] = None
+        return list(places)
 
     def zoned(self) -> Iterator[tuple[ProgramStep, float]]:
         """Yield every step with its zone [m]; 0 before a wait, a joint motion and the end, where the robot stops."""

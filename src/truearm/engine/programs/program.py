@@ -165,10 +165,10 @@ class Program:
 
     def by_file(self) -> dict[Path, list[ProgramTarget]]:
         """Return its targets by the files in which they stand."""
-        found: dict[Path, list[ProgramTarget]] = {source.path: [] for source in self.sources}
+        targets: dict[Path, list[ProgramTarget]] = {source.path: [] for source in self.sources}
         for target in self.targets:
-            found[self.sources[target.source].path].append(target)
-        return found
+            targets[self.sources[target.source].path].append(target)
+        return targets
 
 
 class Edit(NamedTuple):
@@ -217,7 +217,7 @@ class Language:
     #: Of its files, lower case with the dot. The suffix decides the language; what is in the file has to agree.
     suffixes: tuple[str, ...]
     makers: tuple[str, ...]  #: Whose controllers run it, by the names that the maker has; the first is the usual one.
-    is_one: Callable[[str], bool]  #: Whether a text looks like this language.
+    recognizes: Callable[[str], bool]  #: Whether a text looks like this language.
     read: Callable[[Sequence[Source]], Program]  #: Read the files of one program, given together.
     #: Put lines of comment into a text of the language: ASCII, 32 characters at most. Every other byte stays, but for a
     #: count of lines; the text stays as it is where it has no place for them.
@@ -354,7 +354,7 @@ def indentation(text: str, place: int) -> str:
 def replaced(text: str, start: int, stop: int, words: Iterable[tuple[int, int, str]]) -> str:
     """Return a stretch of a text with other words, ``(start, stop, word)``, in places that do not overlap."""
     parts, place = [], start
-    for begin, end, word in sorted(words, key=lambda one: one[:2]):
+    for begin, end, word in sorted(words, key=lambda edit: edit[:2]):
         if begin < place:
             raise ValueError(f"words overlap at {begin}")
         parts += [text[place:begin], word]
@@ -381,8 +381,8 @@ def correction_comment(day: date, robot: str = "", calibration: str = "") -> tup
         robot: For which robot; empty if that stands there already.
         calibration: Hash of the robot's file; empty if it has none.
     """
-    made = f"{day.isoformat()}, calibration {calibration[:8]}" if calibration else day.isoformat()
-    lines = [f"{MARK} {__version__}", made, *([f"for {_UNSAFE.sub('_', robot)}"] if robot else [])]
+    origin = f"{day.isoformat()}, calibration {calibration[:8]}" if calibration else day.isoformat()
+    lines = [f"{MARK} {__version__}", origin, *([f"for {_UNSAFE.sub('_', robot)}"] if robot else [])]
     return tuple(line[:_LONGEST].rstrip() for line in lines)
 
 
@@ -391,10 +391,10 @@ def comment_of(text: str) -> str | None:
 
     They have a line of their own, without other words before them.
     """
-    for found in _MARKED.finditer(text):
-        before = max(text.rfind("\n", 0, found.start()), text.rfind("\r", 0, found.start())) + 1
-        if not re.search("[A-Za-z]", text[before : found.start()]):
-            return found[1]
+    for match in _MARKED.finditer(text):
+        before = max(text.rfind("\n", 0, match.start()), text.rfind("\r", 0, match.start())) + 1
+        if not re.search("[A-Za-z]", text[before : match.start()]):
+            return match[1]
     return None
 
 
@@ -408,7 +408,7 @@ def with_lines_behind(text: str, place: int, lines: Sequence[str], comment: str 
     """
     end = _LINE_END.search(text, place)
     stop = end.start() if end else len(text)
-    rest, break_ = text[place:stop].strip(), line_end(text, place)
-    if not rest or (comment is not None and rest.startswith(comment)):
+    tail, break_ = text[place:stop].strip(), line_end(text, place)
+    if not tail or (comment is not None and tail.startswith(comment)):
         return text[:stop] + "".join(break_ + line for line in lines) + text[stop:]
     return text[:place] + "".join(break_ + line for line in lines) + break_ + text[place:]

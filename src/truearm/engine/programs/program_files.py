@@ -107,7 +107,7 @@ def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
         InputError: If a program has no record, was changed after it was written, or is given twice.
     """
     _refuse_twice(paths)
-    made = []
+    files = []
     for path, name in zip(paths, _names(paths), strict=True):
         record = correction_record(path)
         if record is None:
@@ -116,8 +116,8 @@ def restored(paths: Sequence[Path]) -> tuple[ProgramFile, ...]:
                 where=str(path),
                 allowed=str(record_path(path)),
             )
-        made.append(ProgramFile(path, name, _unchanged_original(path, record)))
-    return tuple(made)
+        files.append(ProgramFile(path, name, _unchanged_original(path, record)))
+    return tuple(files)
 
 
 def read_programs(files: Sequence[ProgramFile]) -> tuple[Program, ...]:
@@ -221,8 +221,8 @@ def write_programs(
         path = folder / name
         refuse_overwriting(path, read)
         report = name.endswith(".html") and exists(path)
-        if report and all(one.files.get(name) != hash_of(read_bytes(path)) for one in sets_in(folder)):
-            raise _not_written_here(path)
+        if report and all(file_set.files.get(name) != hash_of(read_bytes(path)) for file_set in sets_in(folder)):
+            raise _foreign_file(path)
         if name.endswith(".truearm.json"):
             _refuse_losing(path)
         if name.endswith((".truearm.json", ".html")):
@@ -235,11 +235,11 @@ def write_programs(
             )
         if not exists(path):
             continue
-        here = read_bytes(path)
+        present = read_bytes(path)
         record = correction_record(path)
         new = content if isinstance(content, bytes) else content.encode()
-        if here != new and (record is None or record.corrected_sha256 != hash_of(here)):
-            raise _not_written_here(path)
+        if present != new and (record is None or record.corrected_sha256 != hash_of(present)):
+            raise _foreign_file(path)
     if ledger is not None:
         remember(*ledger)
     order = sorted(files, key=lambda name: not name.endswith(".truearm.json"))
@@ -254,7 +254,7 @@ def _refuse_losing(record: Path) -> None:
     try:
         known = correction_record(program)
     except InputError as error:
-        raise _not_written_here(record) from error
+        raise _foreign_file(record) from error
     if known is not None and not exists(program):
         raise InputError(
             "this record holds the original of a program that is not beside it, and is not overwritten",
@@ -263,7 +263,7 @@ def _refuse_losing(record: Path) -> None:
         )
 
 
-def _not_written_here(path: Path) -> InputError:
+def _foreign_file(path: Path) -> InputError:
     return InputError(
         "this file exists already, was not written by truearm or was changed since, and is not overwritten",
         where=str(path),
@@ -360,9 +360,9 @@ def _language(file: ProgramFile) -> Language:
     text = file.original.decode("latin-1")
     for language in LANGUAGES:
         if suffix in language.suffixes:
-            if language.is_one(text):
+            if language.recognizes(text):
                 return language
-            others = [other.name for other in LANGUAGES if other is not language and other.is_one(text)]
+            others = [other.name for other in LANGUAGES if other is not language and other.recognizes(text)]
             raise InputError(
                 f"the file is called as a program in {language.name} and is none",
                 where=str(file.path),
@@ -373,7 +373,7 @@ def _language(file: ProgramFile) -> Language:
         "no robot language has files of this kind",
         where=str(file.path),
         came=suffix or "no suffix",
-        allowed="; ".join(f"{one.name} ({', '.join(one.suffixes)})" for one in LANGUAGES),
+        allowed="; ".join(f"{language.name} ({', '.join(language.suffixes)})" for language in LANGUAGES),
     )
 
 
@@ -388,11 +388,11 @@ def companions(path: Path) -> list[Path]:
     return [p for _, other in pairs for p in siblings if p.suffix.lower() == other]
 
 
-def _same(one: Path, other: Path) -> bool:
+def _same(path: Path, other: Path) -> bool:
     try:
-        return one.samefile(other)
+        return path.samefile(other)
     except (OSError, ValueError):
-        return one == other
+        return path == other
 
 
 def _names(paths: Sequence[Path]) -> list[str]:

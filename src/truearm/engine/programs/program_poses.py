@@ -88,17 +88,17 @@ def pose_numbers(program: Program, before: Array, after: Array, rows: NDArray[np
             offsets[row] = np.linalg.inv(parent) @ after[row]
             if not target.turned:
                 offsets[row, :3, 3] = after[row, :3, 3] - parent[:3, 3]
-    made: dict[int, Array] = {}
+    by_row: dict[int, Array] = {}
     for form, members in _by_form(targets, rows):
         if form.kind == "pose":
             numbers = numbers_of(form, offsets[members], np.array([targets[row].values for row in members]))
-            made |= dict(zip(members.tolist(), numbers, strict=True))
-    return made
+            by_row |= dict(zip(members.tolist(), numbers, strict=True))
+    return by_row
 
 
 def joint_numbers(robot: Robot, program: Program, joints: Array, rows: NDArray[np.intp]) -> dict[int, Array]:
     """Return new numbers of some targets given by joints, as :func:`pose_numbers`; `joints` are those of all."""
-    made: dict[int, Array] = {}
+    by_row: dict[int, Array] = {}
     for form, members in _by_form(program.targets, rows):
         if form.kind == "pose":
             continue
@@ -107,8 +107,8 @@ def joint_numbers(robot: Robot, program: Program, joints: Array, rows: NDArray[n
             numbers = robot.controller.to_pulses(counted)
         else:
             numbers = counted / _joint_units(robot, form)
-        made |= dict(zip(members.tolist(), numbers, strict=True))
-    return made
+        by_row |= dict(zip(members.tolist(), numbers, strict=True))
+    return by_row
 
 
 def numbers_of(form: Form, poses: Array, near: Array) -> Array:
@@ -130,11 +130,11 @@ def edits_of(program: Program, numbers: dict[int, Array]) -> list[Edit]:
         for number, (span, value, decimals) in enumerate(zip(target.places, new.tolist(), fewest, strict=True)):
             if span is not None:
                 old = text[span[0] : span[1]] or "0"
-                made = rewritten(old, value, decimals)
-                if made != old:
+                word = rewritten(old, value, decimals)
+                if word != old:
                     absent = span[0] == span[1]
                     edits.append(
-                        Edit(target.source, *span, target.form.absent[number].format(made) if absent else made)
+                        Edit(target.source, *span, target.form.absent[number].format(word) if absent else word)
                     )
     return edits
 
@@ -181,20 +181,20 @@ Shift = Array | Mapping[str, Array]
 
 
 def provenance(
-    programs: Sequence[Program], cell: Cell, kind: Kind, kept: Sequence[Collection[int]] | None = None
+    programs: Sequence[Program], cell: Cell, kind: Kind, kept_rows: Sequence[Collection[int]] | None = None
 ) -> Provenance:
     """Return whether the real places of all tools or frames in use were given, or of none.
 
     Args:
-        kept: Of each program the targets that stay, by their index: where their tools and frames are does not count.
+        kept_rows: Of each program the targets that stay, by index: where their tools and frames are does not count.
 
     Raises:
         InputError: If only some of them were given, or none that the programs use.
     """
-    given = cell.tools if kind == "tool" else cell.frames
+    placed = cell.tools if kind == "tool" else cell.frames
     used: set[str] = set()
     needed: dict[str, str] = {}
-    for program, staying in zip(programs, kept or [()] * len(programs), strict=True):
+    for program, staying in zip(programs, kept_rows or [()] * len(programs), strict=True):
         for row, target in enumerate(program.targets):
             if row in staying:
                 continue
@@ -206,17 +206,17 @@ def provenance(
         "tool": ("flange", "the flange is taken to be where it agrees best with the nominal one"),
         "frame": ("base", "the base is shifted so that the targets do not move on average"),
     }[kind]
-    if given and needed and not any(name.lower() in given for name in used):
+    if placed and needed and not any(name.lower() in placed for name in used):
         first = next(iter(needed))
         raise InputError(
             f"no {kind} that the programs use is in the file",
             parameter=f"{kind}s",
             where=needed[first],
-            came=", ".join(sorted({name or own for name in given})),
+            came=", ".join(sorted({name or own for name in placed})),
             allowed=", ".join(name or own for name in needed),
             cure=f"Call the {kind}s in the file as the programs do, or leave out `{kind}s`.",
         )
-    known = {name for name in used if given.get(name.lower(), Placed(None, None)).identified is not None}
+    known = {name for name in used if placed.get(name.lower(), Placed(None, None)).identified is not None}
     missing = [name for name in needed if name not in known]
     if known and missing:
         raise InputError(
@@ -232,7 +232,7 @@ def provenance(
 class Places:
     """Where the frames, or the tools, of a program's targets are on the nominal and the real robot: ``(n, 4, 4)``."""
 
-    def __init__(self, program: Program, given: dict[str, Placed], kind: Kind, own: Array) -> None:
+    def __init__(self, program: Program, placed: dict[str, Placed], kind: Kind, own: Array) -> None:
         defined = {name.lower(): t for name, t in (program.tools if kind == "tool" else program.frames).items()}
         names = [(target.tool if kind == "tool" else target.frame).lower() for target in program.targets]
         unique = {name: number for number, name in enumerate(dict.fromkeys(names))}
@@ -240,13 +240,13 @@ class Places:
         self._index = np.array([unique[name] for name in names], dtype=int)
         nominal, real = [], []
         for name in unique:
-            entry = given.get(name, Placed(None, None))
-            here = IDENTITY if name == "" else defined.get(name, entry.controller)
-            if here is None and entry.identified is not None:
+            entry = placed.get(name, Placed(None, None))
+            transform = IDENTITY if name == "" else defined.get(name, entry.controller)
+            if transform is None and entry.identified is not None:
                 raise _measured_only(program, names.index(name), kind)
-            if here is None:
-                raise _undefined(program, name, names, kind, [*defined, *given])
-            nominal.append(own @ here.matrix)
+            if transform is None:
+                raise _undefined(program, name, names, kind, [*defined, *placed])
+            nominal.append(own @ transform.matrix)
             real.append(None if entry.identified is None else entry.identified.matrix)
         self._nominal = np.array(nominal).reshape(-1, 4, 4)
         self._real: list[Array | None] = real

@@ -114,8 +114,8 @@ def resolved_configurations(
     number, bend = np.full(possible.shape, -1), np.zeros(possible.shape)
     kinematics = nominal.forward_kinematics(candidates[possible])
     number[possible], bend[possible] = rule.numbers(kinematics), rule.bend(kinematics)
-    given = nominal.forward_kinematics(np.nan_to_num(known))
-    number_given, bend_given = rule.numbers(given), rule.bend(given)
+    known_kinematics = nominal.forward_kinematics(np.nan_to_num(known))
+    known_number, known_bend = rule.numbers(known_kinematics), rule.bend(known_kinematics)
     reachable[wanted] = possible.any(axis=1)
     choice = _Candidates(nominal, candidates, possible, number, [configurations[i] for i in wanted])
     guessed = None
@@ -130,8 +130,8 @@ def resolved_configurations(
             parent = parents[parent]
         if parent is None or configurations[parent] == ANY_POSTURE:
             return None
-        found = choice.chosen(place[parent], before, None)
-        return None if found is None else found[0]
+        solution = choice.chosen(place[parent], before, None)
+        return None if solution is None else solution[0]
 
     for index in dict.fromkeys((*order, *range(len(flange)))):
         row = place.get(index)
@@ -142,14 +142,14 @@ def resolved_configurations(
             reference = reference if above is None else above
             if reference is None and guessed is None and choice.open[row]:
                 guessed = index
-            kept = branch if index in straight and near is None and above is None else None
-            found = choice.chosen(row, reference, kept)
-            if found is None:
+            wanted_branch = branch if index in straight and near is None and above is None else None
+            solution = choice.chosen(row, reference, wanted_branch)
+            if solution is None:
                 continue
-            joints[index], slot = found
+            joints[index], slot = solution
             branch = int(number[row, slot]) if bend[row, slot] > _STRETCHED else None
         else:
-            branch = int(number_given[index]) if bend_given[index] > _STRETCHED else None
+            branch = int(known_number[index]) if known_bend[index] > _STRETCHED else None
         before = joints[index]
     return ResolvedConfigurations(joints, reachable, guessed)
 
@@ -193,7 +193,7 @@ class _Candidates:
         self._nominal, self._number = nominal, number
         self._joints, self._possible = joints.copy(), possible.copy()
         #: Joints whose turn is given.
-        self._given = np.zeros(joints.shape, dtype=bool)
+        self._fixed = np.zeros(joints.shape, dtype=bool)
         groups: dict[Configuration, list[int]] = {}
         for row, configuration in enumerate(configurations):
             # The joints to be near to are of every target's own, and of no meaning here.
@@ -219,12 +219,12 @@ class _Candidates:
             turn = np.argmin(np.where(allowed, np.abs(position), np.inf), axis=2)
             turns = np.where(allowed.any(axis=2), _TURNS[turn], 0.0)
             joints[rows, :, joint - 1] += signs[joint - 1] * turns * _TURN
-            self._given[rows, :, joint - 1] = True
+            self._fixed[rows, :, joint - 1] = True
             self._possible[rows] &= allowed.any(axis=2)
 
     def _turn_near_zero(self) -> None:
         """Turn joints whose turn is not given near to zero, and prefer candidates within the limits."""
-        free = ~self._given
+        free = ~self._fixed
         self._low, self._high = limits(self._nominal)
         near_zero = nearest_turns(self._nominal, self._joints, np.zeros(self._joints.shape[2]))
         self._joints = np.where(free, near_zero, self._joints)

@@ -111,10 +111,10 @@ class ResolvedProgram:
         #: The same without what acts on the tool: bases are found by what the arm does at rest.
         self._free_arms, self._free_arm = _each_once(carried)
         known = joints_of(nominal, program)
-        self._joints_given: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
+        self._by_joints: NDArray[np.bool_] = np.asarray(~np.isnan(known).any(axis=1))
         poses = poses_of(program)
         flange = np.zeros((len(targets), 4, 4))
-        by_pose, by_joints = ~self._joints_given, self._joints_given
+        by_pose, by_joints = ~self._by_joints, self._by_joints
         back = np.linalg.inv(self._tool.nominal)
         flange[by_pose] = self._base.nominal[by_pose] @ poses[by_pose] @ back[by_pose]
         flange[by_joints] = matrices(nominal, known[by_joints])
@@ -127,30 +127,30 @@ class ResolvedProgram:
         self._resolved: ResolvedConfigurations = resolved_configurations(
             nominal, flange, configurations, known, order, [target.parent for target in targets], _straight(program)
         )
-        found = self._resolved
-        self.guess = "" if found.guessed is None else place(program, targets[found.guessed])
-        self.joints = found.joints
+        resolved = self._resolved
+        self.guess = "" if resolved.guessed is None else place(program, targets[resolved.guessed])
+        self.joints = resolved.joints
         stays = np.isin(np.arange(len(targets)), list(self._kept))
-        self._found_joints: NDArray[np.bool_] = np.asarray(~np.isnan(found.joints).any(axis=1))
-        self._usable: NDArray[np.bool_] = self._found_joints & ~stays
+        self._has_joints: NDArray[np.bool_] = np.asarray(~np.isnan(resolved.joints).any(axis=1))
+        self._usable: NDArray[np.bool_] = self._has_joints & ~stays
         first = np.array([self._first(row) for row in range(len(targets))], dtype=np.intp)
         self._firsts = first
         #: Which are offsets from targets that stay.
         self._anchored: NDArray[np.bool_] = ~stays & stays[first] & (first != np.arange(len(targets)))
-        self._usable &= ~self._anchored | self._found_joints[first]
+        self._usable &= ~self._anchored | self._has_joints[first]
 
     def _pushed(self, carried: Sequence[Robot], wrenches: Sequence[Wrench | None], flange: Shift) -> list[Robot]:
         """Return the robot of each target with what acts on the tool there, one for all that have the same."""
         places = self._tool.real(np.arange(len(carried)), flange)
         known: dict[tuple[int, str, Wrench | None], Robot] = {}
-        made = []
+        robots = []
         for target, arm, wrench, at in zip(self._program.targets, carried, wrenches, places, strict=True):
             key = (id(arm), target.tool.lower(), wrench)
             if key not in known:
                 tool = Transform.from_matrix(at[:3, :3], at[:3, 3])
                 known[key] = arm if wrench is None else arm.with_wrench(wrench, tool)
-            made.append(known[key])
-        return made
+            robots.append(known[key])
+        return robots
 
     @property
     def forces(self) -> int:
@@ -203,7 +203,7 @@ class ResolvedProgram:
         """
         if not len(rows):
             return TipsFound(rows, near, np.zeros((0, 4, 4)), np.zeros((0, 4, 4)))
-        fake_targets = self._found(rows, base, flange, near, pushed=False)
+        fake_targets = self._fake_targets(rows, base, flange, near, pushed=False)
         good = fake_targets.solutions.usable
         tips = self._base.nominal[rows] @ self._poses[rows]
         after = fake_targets.flange @ self._tool.nominal[rows]
@@ -223,12 +223,12 @@ class ResolvedProgram:
         """
         rows = np.arange(len(self._program.targets))
         at = self._resolved.joints if joints is None else joints
-        there, tools = np.full((len(rows), 3), np.nan), self._tool.real(rows, flange)
+        tips, tools = np.full((len(rows), 3), np.nan), self._tool.real(rows, flange)
         for number, arm in enumerate(self._arms):
-            mine = np.flatnonzero((self._arm == number) & np.isfinite(at).all(axis=1))
-            position, rotation = arm.forward(at[mine])
-            there[mine] = position + np.einsum("nij,nj->ni", rotation, tools[mine, :3, 3])
-        return (self._base.real(rows, base) @ self._meant(base, flange))[:, :3, 3], there
+            members = np.flatnonzero((self._arm == number) & np.isfinite(at).all(axis=1))
+            position, rotation = arm.forward(at[members])
+            tips[members] = position + np.einsum("nij,nj->ni", rotation, tools[members, :3, 3])
+        return (self._base.real(rows, base) @ self._meant(base, flange))[:, :3, 3], tips
 
     def correction(self, base: Shift, flange: Array) -> Correction:
         """Return the corrected program, with what was taken for the real base and flange."""
@@ -241,7 +241,7 @@ class ResolvedProgram:
             if row not in self._kept:
                 reasons[row] = self._why_not(row)
         if len(rows):
-            fake_targets = self._found(rows, base, flange, self.joints_near(rows))
+            fake_targets = self._fake_targets(rows, base, flange, self.joints_near(rows))
             joints[rows] = fake_targets.joints
             for at, row in enumerate(rows.tolist()):
                 if not fake_targets.solutions.status[at].usable:
@@ -252,9 +252,9 @@ class ResolvedProgram:
         # An offset that cannot be corrected goes along with the point that it begins at, where that stays on purpose.
         along = {row: self._kept[self._first(row)] for row in reasons if self._first(row) in self._kept}
         reasons = {row: reason for row, reason in reasons.items() if row not in along}
-        kept = {**self._kept, **along}
+        unchanged = {**self._kept, **along}
         corrected = np.ones(count, dtype=bool)
-        corrected[[*reasons, *kept]] = False
+        corrected[[*reasons, *unchanged]] = False
         after[~corrected], joints[~corrected] = self._poses[~corrected], self._resolved.joints[~corrected]
         targets = program.targets
         left = [Skipped(targets[row].source, targets[row].line, reason) for row, reason in reasons.items()]
@@ -268,12 +268,12 @@ class ResolvedProgram:
             tips=self.tips,
             joints=joints,
             on_edge=on_edge,
-            kept=kept,
+            kept=unchanged,
         )
 
     def _why_not(self, row: int) -> str:
         """Return why a target that shall be corrected cannot be computed."""
-        if self._found_joints[row]:
+        if self._has_joints[row]:
             return "the nominal robot does not reach the point that it is an offset from: check its tool and frame"
         if self._resolved.reachable[row]:
             return (
@@ -283,9 +283,9 @@ class ResolvedProgram:
         return "out of reach of the nominal robot: check its tool and frame"
 
     def _edits(self, after: Array, joints: Array, corrected: NDArray[np.bool_]) -> tuple[Edit, ...]:
-        program, given = self._program, self._joints_given
-        numbers = pose_numbers(program, self._poses, after, np.flatnonzero(corrected & ~given))
-        numbers |= joint_numbers(self._nominal, program, joints, np.flatnonzero(corrected & given))
+        program, by_joints = self._program, self._by_joints
+        numbers = pose_numbers(program, self._poses, after, np.flatnonzero(corrected & ~by_joints))
+        numbers |= joint_numbers(self._nominal, program, joints, np.flatnonzero(corrected & by_joints))
         return tuple(edits_of(program, numbers))
 
     def reached(self, correction: Correction, flange: Array, frames: Sequence[str]) -> TargetsReached:
@@ -308,21 +308,21 @@ class ResolvedProgram:
         rows = np.flatnonzero(correction.corrected)
         known = expected.of_some(rows, len(correction.corrected))
         worse = np.nan_to_num(known.worse) > LIKELY
-        kept = np.zeros_like(worse) if every else kept_targets(self._program, correction.moved, known)
-        corrected = correction.corrected & ~kept
-        after = np.where(kept[:, None, None], correction.before, correction.after)
-        joints = np.where(kept[:, None], self._resolved.joints, correction.joints)
-        left = np.flatnonzero(kept & correction.corrected).tolist()
+        unchanged = np.zeros_like(worse) if every else kept_targets(self._program, correction.moved, known)
+        corrected = correction.corrected & ~unchanged
+        after = np.where(unchanged[:, None, None], correction.before, correction.after)
+        joints = np.where(unchanged[:, None], self._resolved.joints, correction.joints)
+        left = np.flatnonzero(unchanged & correction.corrected).tolist()
         return replace(
             correction,
             kept={**correction.kept, **dict.fromkeys(left, _NOT_BETTER)},
-            edits=self._edits(after, joints, corrected) if kept.any() else correction.edits,
+            edits=self._edits(after, joints, corrected) if unchanged.any() else correction.edits,
             corrected=corrected,
             after=after,
             joints=joints,
             on_edge=tuple(row for row in correction.on_edge if corrected[row]),
             expected=known,
-            not_better=tuple(np.flatnonzero(worse | kept).tolist()),
+            not_better=tuple(np.flatnonzero(worse | unchanged).tolist()),
         )
 
     def between(
@@ -334,7 +334,7 @@ class ResolvedProgram:
         fakes = np.linalg.inv(self._base.nominal[rows]) @ fake_targets.flange @ self._tool.nominal[rows]
         return fakes, fake_targets.solutions.usable
 
-    def _found(
+    def _fake_targets(
         self, rows: NDArray[np.intp], base: Shift, flange: Array, near: Array, *, pushed: bool = True
     ) -> FakeTargets:
         poses = self._meant(base, flange)
@@ -359,11 +359,11 @@ class ResolvedProgram:
             return self._poses
         program, poses, before = self._program, self._poses.copy(), self._poses
         firsts = np.unique(self._firsts[anchored])
-        there = np.zeros((len(firsts), 4, 4))
+        flanges = np.zeros((len(firsts), 4, 4))
         for number, arm in enumerate(self._arms):
-            mine = self._arm[firsts] == number
-            there[mine] = np.linalg.inv(arm.base.matrix) @ matrices(arm, self._resolved.joints[firsts[mine]])
-        poses[firsts] = np.linalg.inv(self._base.real(firsts, base)) @ there @ self._tool.real(firsts, flange)
+            in_arm = self._arm[firsts] == number
+            flanges[in_arm] = np.linalg.inv(arm.base.matrix) @ matrices(arm, self._resolved.joints[firsts[in_arm]])
+        poses[firsts] = np.linalg.inv(self._base.real(firsts, base)) @ flanges @ self._tool.real(firsts, flange)
         for row in offsets_in_order(program):
             target = program.targets[row]
             if target.parent is not None and self._anchored[row]:
@@ -397,12 +397,12 @@ class ResolvedProgram:
 
     def _on_edge(self, rows: NDArray[np.intp], joints: Array, reasons: Mapping[int, str]) -> tuple[int, ...]:
         """Return the targets that leave the ranges of their configuration and did not before."""
-        found: list[int] = []
+        beyond: list[int] = []
         for configuration, members in self._configured(rows, reasons):
             before = agrees(self._robot, self._resolved.joints[members], configuration, _ROUNDING)
             after = agrees(self._robot, joints[members], configuration, _ROUNDING)
-            found += members[before & ~after].tolist()
-        return tuple(sorted(found))
+            beyond += members[before & ~after].tolist()
+        return tuple(sorted(beyond))
 
     def _configured(
         self, rows: NDArray[np.intp], reasons: Mapping[int, str]
@@ -424,8 +424,8 @@ def _each_once(arms: Sequence[Robot]) -> tuple[tuple[Robot, ...], NDArray[np.int
     return once, np.array([number[id(arm)] for arm in arms], dtype=np.intp)
 
 
-def _reason(found: FakeTargets, at: int) -> str:
-    status, solutions = found.solutions.status[at], found.solutions
+def _reason(fakes: FakeTargets, at: int) -> str:
+    status, solutions = fakes.solutions.status[at], fakes.solutions
     if status is PoseStatus.BRANCH_LOST:
         return f"the posture would change: it is reached as {solutions.branch[at]} only"
     return solutions.advice(at).rstrip(".")

@@ -79,18 +79,18 @@ def balancer_wrenches(
     """
     lower, upper = balancer.fixed, balancer.moving
     start, stop = ends[lower.link], ends[upper.link]
-    held = robot.axial_slides.stayed(lower.link, lower.point, values)
+    anchor = robot.axial_slides.stayed(lower.link, lower.point, values)
     moved = robot.axial_slides.stayed(upper.link, upper.point, values)
     seen: Coordinates = moved
     for element, move in zip(reversed(elements[start:stop]), reversed(moves[start:stop]), strict=True):
         if move:
             seen = in_frame_before(seen, element, move)
-    way = held[0] - seen[0], held[1] - seen[1], held[2] - seen[2]
+    way = anchor[0] - seen[0], anchor[1] - seen[1], anchor[2] - seen[2]
     length = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
     share = balancer.pull(length) / length
     force: Coordinates = way[0] * share, way[1] * share, way[2] * share
     against = -force[0], -force[1], -force[2]
-    yield start, (against, cross(held, against))
+    yield start, (against, cross(anchor, against))
     for element, move in zip(elements[start:stop], moves[start:stop], strict=True):
         if move and element.turns:
             force = in_frame_behind(force, element, move)

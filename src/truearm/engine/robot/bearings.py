@@ -50,8 +50,8 @@ class AxialSlides:
         frames = []
         for end in _ends(links)[1:]:
             R = kinematics.matrix(end)[0]
-            found = [(R.T @ run.along, run.before(end, run.along)) for run in runs if run.start <= end <= run.stop]
-            frames.append(tuple(((float(x), float(y), float(z)), offsets) for (x, y, z), offsets in found if offsets))
+            slides = [(R.T @ run.along, run.before(end, run.along)) for run in runs if run.start <= end <= run.stop]
+            frames.append(tuple(((float(x), float(y), float(z)), offsets) for (x, y, z), offsets in slides if offsets))
         return cls(tuple(joints), tuple(frames))
 
     def stayed(self, link: int, point: Direction, values: Mapping[str, float]) -> Direction:

@@ -251,21 +251,21 @@ class Chain:
             values: Parameter values that replace nominal ones, each a number or ``(trials, 1)`` [rad or m].
             start: Forward kinematics to go on from, with the same `variables` and `values`.
         """
-        given = values or {}
+        assigned = values or {}
         moves: list[Move] = []
         for element in self.elements:
             amount: Number = element.value
             if element.parameter is not None:
-                amount = given.get(element.parameter, amount)
+                amount = assigned.get(element.parameter, amount)
             if element.variable is not None:
                 amount = amount + variables[element.variable]
             for name, factor, nominal in element.offsets:
-                amount = amount + factor * (given.get(name, nominal) - nominal)
+                amount = amount + factor * (assigned.get(name, nominal) - nominal)
             moves.append(_move(element, amount))
         if start is not None:
             return ForwardKinematics((*start.elements, *self.elements), (*start.moves, *moves), start.shape, start)
         shape = variables.shape[1:]
-        trials = next((value.shape for value in given.values() if isinstance(value, np.ndarray)), ())
+        trials = next((value.shape for value in assigned.values() if isinstance(value, np.ndarray)), ())
         return ForwardKinematics(self.elements, tuple(moves), np.broadcast_shapes(shape, trials) if trials else shape)
 
 

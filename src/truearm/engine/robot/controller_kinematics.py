@@ -12,30 +12,30 @@ from truearm.engine.robot.robot_file.entries import ALLOWED, STATED
 from truearm.engine.robot.ur_kinematics import controller_robot, read_kinematics, refuse_far, with_kinematics
 
 
-def with_controller_kinematics(robot: Robot, said: str, folder: Path) -> Robot:
+def with_controller_kinematics(robot: Robot, stated: str, folder: Path) -> Robot:
     """Return a robot with what its controller computes with.
 
     Args:
-        said: ``nominal``, ``proprietary``, ``unknown`` or the name of a file.
+        stated: ``nominal``, ``proprietary``, ``unknown`` or the name of a file.
         folder: Where such a file lies if its name is no whole path.
 
     Raises:
         InputError: If it is none of the words and there is no such file, or the file is of another type of robot.
     """
-    kinematics = STATED.get(said)
+    kinematics = STATED.get(stated)
     if kinematics is None:
-        path = folder / said
+        path = folder / stated
         if not exists(path):
             raise InputError(
                 "nobody can read these kinematics: it is no word that is known, and there is no such file",
                 where=str(path),
-                came=said,
+                came=stated,
                 allowed=ALLOWED,
-                cure=did_you_mean(said, STATED) or "Copy the file there, or state what the controller computes with.",
+                cure=did_you_mean(stated, STATED) or "Copy the file there, or state what the controller computes with.",
             )
-        made = with_kinematics(robot, read_kinematics(path))
-        refuse_far(made, robot, str(path))
-        kinematics = made.controller.kinematics
+        controller_arm = with_kinematics(robot, read_kinematics(path))
+        refuse_far(controller_arm, robot, str(path))
+        kinematics = controller_arm.controller.kinematics
     return replace(robot, controller=replace(robot.controller, kinematics=kinematics))
 
 

@@ -49,7 +49,7 @@ TableConvention = Literal["standard-dh", "modified-dh", "hayati"]
 #: Below this angle [rad] the common normal of two axes that are not parallel runs away.
 _NEARLY_PARALLEL: Final = math.radians(0.5)
 #: Below this rest [m, rad] what lies behind the last axis is a DH link's own a and alpha.
-_REST: Final = 1e-12
+_NEGLIGIBLE: Final = 1e-12
 
 
 @dataclass(frozen=True)
@@ -96,24 +96,24 @@ def dh_table(robot: Robot, convention_name: DHConvention) -> DHTable:
     # theta, d, a, alpha in the order of the chain: the first two to the common normal, the others along it.
     # The standard form cuts the chain behind them into links, the modified form before a and alpha.
     numbers: list[tuple[float, float, float, float]] = []
-    x, here = start[:3, 0], start[:3, 3]
+    x, origin = start[:3, 0], start[:3, 3]
     for axis, following in pairwise(axes):
-        normal, foot, landing = common_normal(axis, following, x, here)
+        normal, foot, landing = common_normal(axis, following, x, origin)
         numbers.append(
             (
                 turn(x, normal, axis.along),
-                float((foot - here) @ axis.along),
+                float((foot - origin) @ axis.along),
                 float((landing - foot) @ normal),
                 turn(axis.along, following.along, normal),
             )
         )
-        x, here = normal, landing
+        x, origin = normal, landing
     last = axes[-1]
     normal, foot = across(flange[:3, :3], last.along), last.nearest(flange[:3, 3])
     behind = np.linalg.inv(frame(normal, last.along, foot)) @ flange
-    own = convention_name == "standard-dh" and np.abs(behind[[1, 1, 2], [3, 0, 0]]).max() < _REST < behind[0, 0]
+    own = convention_name == "standard-dh" and np.abs(behind[[1, 1, 2], [3, 0, 0]]).max() < _NEGLIGIBLE < behind[0, 0]
     a, alpha = (float(behind[0, 3]), math.atan2(behind[2, 1], behind[1, 1])) if own else (0.0, 0.0)
-    theta, d = turn(x, normal, last.along), float((foot - here) @ last.along)
+    theta, d = turn(x, normal, last.along), float((foot - origin) @ last.along)
     numbers.append((theta, d, a, alpha))
     rows = _rows(robot.joints, numbers, convention_name)
     table = DHTable(convention_name, rows, _transform(start), Transform())
@@ -141,8 +141,8 @@ def _axes(robot: Robot) -> list[JointAxis]:
     return axes
 
 
-def _nearly_parallel(one: JointAxis, other: JointAxis) -> bool:
-    return PARALLEL < one.angle(other) < _NEARLY_PARALLEL
+def _nearly_parallel(axis: JointAxis, other: JointAxis) -> bool:
+    return PARALLEL < axis.angle(other) < _NEARLY_PARALLEL
 
 
 def _transform(frame: Array) -> Transform:

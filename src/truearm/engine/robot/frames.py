@@ -91,20 +91,20 @@ def jacobian(robot: Robot, joints: ArrayLike | Postures, frame: Frame, target: s
     at = robot.loaded(_postures(robot, joints))
     kinematics = robot.forward_kinematics(at, target)
     if not robot.effects:
-        found = robot.joint_jacobian(at, target)
+        derivative = robot.joint_jacobian(at, target)
     else:
         rates = _rates(robot, at)
         moved = np.flatnonzero(rates.any(axis=(1, 2)))
         by_variable = np.concatenate(kinematics.jacobians([robot.moving[i] for i in moved]), axis=1)
-        found = np.einsum("vcn,vjn->ncj", by_variable, rates[moved])
+        derivative = np.einsum("vcn,vjn->ncj", by_variable, rates[moved])
     if frame == "world":
-        return found
+        return derivative
     if tip != IDENTITY:  # a point that is carried along moves by the turn across its distance, too
         ahead = robot.world_poses(at, target)[1] @ np.array(tip.translation)
-        found = found.copy()
-        found[:, :3] += np.cross(found[:, 3:].swapaxes(1, 2), ahead[:, None]).swapaxes(1, 2)
-    turned = base.rotation.T @ found.reshape(len(found), 2, 3, found.shape[2])
-    return turned.reshape(found.shape)
+        derivative = derivative.copy()
+        derivative[:, :3] += np.cross(derivative[:, 3:].swapaxes(1, 2), ahead[:, None]).swapaxes(1, 2)
+    turned = base.rotation.T @ derivative.reshape(len(derivative), 2, 3, derivative.shape[2])
+    return turned.reshape(derivative.shape)
 
 
 def _postures(robot: Robot, joints: ArrayLike | Postures) -> Postures:
@@ -134,16 +134,16 @@ def placed(robot: Robot, base: Transform, targets: Mapping[str, Transform | Sequ
     """Return a robot at another place with other targets, as :meth:`truearm.Robot.with_frames` does."""
     _refuse_other(base, Transform, "base", "a Transform")
     _refuse_other(targets, Mapping, "targets", "a mapping from names to places")
-    kept = {n: p for n, p in robot.known.items() if p.group not in ("base", "target")}
-    made, places = [], dict(zip(("base_x", "base_y", "base_z"), base.translation, strict=True))
+    known = {n: p for n, p in robot.known.items() if p.group not in ("base", "target")}
+    placed_targets, places = [], dict(zip(("base_x", "base_y", "base_z"), base.translation, strict=True))
     for name, place in targets.items():
         _refuse_other(name, str, "targets", "a name for each place")
         frame = place if isinstance(place, Transform) else None
         position = number_array(frame.translation if frame else place, "targets", (3,), allowed=_PLACE).tolist()
         target = Target(name, frame.quaternion if frame else None)
         places |= {target.parameter(a): v for a, v in zip("xyz", position, strict=True)}
-        made.append(target)
-    moved = replace(robot, base_quaternion=base.quaternion, targets=tuple(made), known=kept)
+        placed_targets.append(target)
+    moved = replace(robot, base_quaternion=base.quaternion, targets=tuple(placed_targets), known=known)
     robot.share(moved, ARM)
     return moved.with_parameters(moved.parameters[n].restarted(v) for n, v in places.items())
 
@@ -157,14 +157,16 @@ def fixtures_placed(robot: Robot, places: Mapping[str, tuple[FixtureKind, Transf
         if not fits or not isinstance(entry[0], str) or entry[0] not in get_args(FixtureKind):
             allowed = f"a kind ({', '.join(get_args(FixtureKind))}) and a Transform"
             raise wrong_kind("this says nothing of a fixture", entry, "places", allowed, where=name)
-    kept = {n: p for n, p in robot.known.items() if p.group != "fixture"}
-    made = tuple(Fixture(name, kind, place.quaternion) for name, (kind, place) in places.items())
-    beside = replace(robot, fixtures=made, known=kept)
+    known = {n: p for n, p in robot.known.items() if p.group != "fixture"}
+    fixtures = tuple(Fixture(name, kind, place.quaternion) for name, (kind, place) in places.items())
+    beside = replace(robot, fixtures=fixtures, known=known)
     robot.share(beside, STRUCTURE)
-    values = {n: v for f, (_, place) in zip(made, places.values(), strict=True) for n, v in f.values_at(place).items()}
+    values = {
+        n: v for f, (_, place) in zip(fixtures, places.values(), strict=True) for n, v in f.values_at(place).items()
+    }
     return beside.with_parameters(beside.parameters[n].restarted(v) for n, v in values.items())
 
 
-def _refuse_other(given: object, kind: type, parameter: str, allowed: str) -> None:
-    if not isinstance(given, kind):
-        raise wrong_kind("an object of another kind belongs here", given, parameter, allowed)
+def _refuse_other(value: object, kind: type, parameter: str, allowed: str) -> None:
+    if not isinstance(value, kind):
+        raise wrong_kind("an object of another kind belongs here", value, parameter, allowed)

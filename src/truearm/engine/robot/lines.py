@@ -59,9 +59,9 @@ def joint_axes(robot: Robot) -> list[JointAxis]:
 def at_zero(robot: Robot, elements: Iterable[Element]) -> Array:
     """Return the product of some of a robot's elements, joint variables at zero, ``(4, 4)``."""
     kinematics = Chain(tuple(elements)).forward_kinematics(np.zeros((len(robot.joints), 1)), robot.values)
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = kinematics.matrix()[0], kinematics.position[:, 0]
-    return made
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = kinematics.matrix()[0], kinematics.position[:, 0]
+    return matrix
 
 
 def base_and_flange(robot: Robot) -> tuple[Array, Array]:
@@ -94,18 +94,18 @@ def frame_between(axis: JointAxis, other: JointAxis) -> Array:
     return frame(normal / sine, axis.along, foot)
 
 
-def common_normal(axis: JointAxis, following: JointAxis, before: Array, here: Array) -> tuple[Array, Array, Array]:
+def common_normal(axis: JointAxis, following: JointAxis, before: Array, origin: Array) -> tuple[Array, Array, Array]:
     """Return direction, start and end of a common normal of two axes.
 
     Args:
         before: The x direction of the frame on `axis`: of two opposite normals the one nearer to it is taken, so that
             joint zeros stay what they were; where both are as near, the one that points to `following`.
-        here: Origin of that frame, on `axis`.
+        origin: Origin of that frame, on `axis`.
     """
     normal = np.cross(axis.along, following.along)
     sine = float(np.linalg.norm(normal))
     if sine < PARALLEL:
-        foot, landing = here, following.nearest(here)
+        foot, landing = origin, following.nearest(origin)
         distance = float(np.linalg.norm(landing - foot))
         if distance < ONE_LINE:
             return before, foot, landing
@@ -144,6 +144,6 @@ def turn(start: Array, end: Array, axis: Array) -> float:
 
 def frame(x: Array, z: Array, origin: Array) -> Array:
     """Return the frame of these axes, ``(4, 4)``."""
-    made = np.eye(4)
-    made[:3, 0], made[:3, 1], made[:3, 2], made[:3, 3] = x, np.cross(z, x), z, origin
-    return made
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = x, np.cross(z, x), z, origin
+    return matrix

@@ -92,9 +92,9 @@ def joint_loads(
     ends = [0, *accumulate(len(link) for link in robot.moved_links)]
     bodies = _bodies(robot, ends)
     moving = velocity is not None or acceleration is not None
-    rest = np.zeros((count, 1))
-    qd = rest if velocity is None else velocity
-    qdd = rest if acceleration is None else acceleration
+    zeros = np.zeros((count, 1))
+    qd = zeros if velocity is None else velocity
+    qdd = zeros if acceleration is None else acceleration
 
     fall: Coordinates = robot.gravity
     omega = alpha = force = moment = _ZERO
@@ -157,16 +157,16 @@ def _refuse_other_shapes(
     robot: Robot, size: int, velocity: Array | None, acceleration: Array | None, wrench: Array | None
 ) -> None:
     count = len(robot.joints)
-    for name, given, rows in (
+    for name, values, rows in (
         ("velocity", velocity, count),
         ("acceleration", acceleration, count),
         ("wrench", wrench, 6),
     ):
-        if given is not None and np.shape(given) != (rows, size):
+        if values is not None and np.shape(values) != (rows, size):
             raise InputError(
                 f"the {name} has another shape than it should",
                 where=robot.name,
-                came=f"an array of shape {np.shape(given)}",
+                came=f"an array of shape {np.shape(values)}",
                 allowed=f"({rows}, {size}): one column for each configuration",
             )
 
@@ -186,11 +186,11 @@ def relief(robot: Robot, variables: Array) -> Array:
     elements = robot.arm.elements
     moves = robot.arm.forward_kinematics(variables, robot.values).moves
     ends = [0, *accumulate(len(link) for link in robot.moved_links)]
-    found = []
+    columns = []
     for balancer in robot.balancers:
         applied = {p: [w] for p, w in balancer_wrenches(robot, balancer, elements, moves, ends, robot.values)}
-        found.append(_carried(robot, elements, moves, applied, (_ZERO, _ZERO), np.shape(variables)[-1]))
-    return np.array(found)
+        columns.append(_carried(robot, elements, moves, applied, (_ZERO, _ZERO), np.shape(variables)[-1]))
+    return np.array(columns)
 
 
 def _carried(
@@ -278,33 +278,33 @@ def settled(following: Callable[[NDArray[np.intp], Array], Array], start: Array)
     Args:
         following: Returns what follows on some columns, given their places and what they are now.
     """
-    found = np.array(start, float)
-    left = np.arange(found.shape[1])
+    solution = np.array(start, float)
+    left = np.arange(solution.shape[1])
     for number in range(_MOST_ROUNDS):
         if not len(left):
             break
-        before = found[:, left]
+        before = solution[:, left]
         way = following(left, before) - before
-        found[:, left] = before + (way if number < _WHOLE_ROUNDS else 0.5 * way)
+        solution[:, left] = before + (way if number < _WHOLE_ROUNDS else 0.5 * way)
         left = left[np.abs(way).max(axis=0) > _SETTLED]
-    return found
+    return solution
 
 
 def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
     """Return postures with the loads of the arm as it has bent under them."""
 
-    def bent(rows: NDArray[np.intp], variables: Array) -> Array:
+    def deflected(rows: NDArray[np.intp], variables: Array) -> Array:
         part = at.at(rows)
         return robot.variables(carrying(robot, part, variables), robot.values)
 
     straight = robot.without_deflections(at.joints.T)
     start = robot.variables(carrying(robot, at, straight), robot.values)
-    variables = settled(bent, start)
-    there = carrying(robot, at, variables)
+    variables = settled(deflected, start)
+    loaded = carrying(robot, at, variables)
     factors = [f"balancer_{number}" for number in range(1, len(robot.balancers) + 1)]
     if not factors or factors[0] not in robot.parameters:
-        return there
-    return replace(there, relief=(relief(robot, variables), tuple(robot.values[name] for name in factors)))
+        return loaded
+    return replace(loaded, relief=(relief(robot, variables), tuple(robot.values[name] for name in factors)))
 
 
 def joint_efforts(robot: Robot, q: Array | Postures) -> Array:

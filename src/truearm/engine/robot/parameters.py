@@ -143,14 +143,14 @@ _STEP: Final = 1e-6
 def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
     """Return all parameters by name: base, joints, effects, targets, fixtures."""
     zeros = {f"{robot.convention.zero(j.kind)}_{i}" for i, j in enumerate(robot.joints, 1)}
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
 
     def add(name: str, unit: Unit, group: Group, nominal: float) -> None:
-        if name in found:
+        if name in parameters:
             raise InputError(
                 "two parameters of the robot would have the same name", where=name, cure="Rename the target or fixture."
             )
-        found[name] = robot.known.get(name) or parameter(name, unit, group, nominal, robot.priors)
+        parameters[name] = robot.known.get(name) or parameter(name, unit, group, nominal, robot.priors)
 
     for element in robot.trunk.elements:
         if element.parameter is not None:
@@ -159,14 +159,14 @@ def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
             add(name, _unit(element), "base" if name.startswith("base_") else group, element.value)
     for effect in robot.effects:
         for plain in effect.parameters:
-            if plain.name in found:
+            if plain.name in parameters:
                 raise InputError(
                     "two joint effects of the robot have the same parameter",
                     where=f"{robot.name}, {plain.name}",
                     came=", ".join(e.name for e in robot.effects if plain.name in [p.name for p in e.parameters]),
                     cure="They are forms of one effect: take one of them.",
                 )
-            found[plain.name] = robot.known.get(plain.name, plain)
+            parameters[plain.name] = robot.known.get(plain.name, plain)
     beside: tuple[tuple[Group, Sequence[Target | Fixture]], ...] = (
         ("target", robot.targets),
         ("fixture", robot.fixtures),
@@ -176,8 +176,8 @@ def all_parameters(robot: RobotData) -> Mapping[str, Parameter]:
             if element.parameter is not None:
                 add(element.parameter, _unit(element), group_of, element.value)
     if SCALE in robot.known:
-        found[SCALE] = robot.known[SCALE]
-    return found
+        parameters[SCALE] = robot.known[SCALE]
+    return parameters
 
 
 def effect_rates(
@@ -189,8 +189,8 @@ def effect_rates(
     if not effects:
         return {}
     at = robot.loaded(q)
-    there = at.relieved(values)
-    rates = {n: rate for effect in effects for n, rate in effect.derivative(there, values).items() if n in asked}
+    relieved = at.relieved(values)
+    rates = {n: rate for effect in effects for n, rate in effect.derivative(relieved, values).items() if n in asked}
     return rates | (_balancer_rates(robot, at, asked, values) if at.relief else {})
 
 
@@ -200,11 +200,11 @@ def _balancer_rates(
     """Return the derivative of the chain's variables by factors of balancers: of what joints do under loads."""
 
     def under(name: str, more: float) -> dict[int, Array]:
-        there = at.relieved({**values, name: np.asarray(values[name]) + more})
+        relieved = at.relieved({**values, name: np.asarray(values[name]) + more})
         moved: dict[int, Array] = {}
         for effect in robot.effects:
             if effect.loaded:
-                for variable, part in effect.deflection(there, values).items():
+                for variable, part in effect.deflection(relieved, values).items():
                     moved[variable] = moved.get(variable, 0.0) + part
         return moved
 

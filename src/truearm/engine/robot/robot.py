@@ -46,11 +46,11 @@ class Robot(RobotData):
         allowed = "a sequence of Parameters"
         if not isinstance(parameters, Iterable):
             raise wrong_kind("parameters belong here", parameters, "parameters", allowed)
-        given = [*parameters]
-        for parameter in given:
+        listed = [*parameters]
+        for parameter in listed:
             if not isinstance(parameter, Parameter):
                 raise wrong_kind("a parameter belongs here", parameter, "parameters", allowed)
-        changed = {p.name: p for p in given}
+        changed = {p.name: p for p in listed}
         self._refuse_unknown(changed, "parameters")
         other = replace(self, known={**self.known, **changed})
         # A solver asks for hundreds of such copies: they share what does not depend on values.
@@ -193,10 +193,10 @@ class Robot(RobotData):
         """
         if deviation is None and SCALE not in self.known:
             return self
-        kept = {name: p for name, p in self.known.items() if name != SCALE}
+        known = {name: p for name, p in self.known.items() if name != SCALE}
         if deviation is not None:
-            kept[SCALE] = Parameter.plain(SCALE, "1", SCALE_GROUP, 0.0, deviation)
-        other = replace(self, known=kept)
+            known[SCALE] = Parameter.plain(SCALE, "1", SCALE_GROUP, 0.0, deviation)
+        other = replace(self, known=known)
         self.share(other, STRUCTURE)
         return other
 
@@ -498,15 +498,15 @@ def _refuse_above_rating(robot: Robot, wrench: Wrench) -> None:
     weight = robot.rated_load * STANDARD_GRAVITY
     at_reach = weight * reach(robot, None)
     cure = "Check number and unit. If the maker allows it, fix the entry rated_load of the robot file."
-    for what, came, most, unit in (
+    for load, value, most, unit in (
         ("force", math.hypot(*wrench.force), weight, "N"),
         ("moment", math.hypot(*wrench.moment), at_reach, "N m"),
     ):
-        if came > most * (1.0 + 1e-9):
+        if value > most * (1.0 + 1e-9):
             raise InputError(
-                f"the {what} is larger than {robot.name} is rated for",
+                f"the {load} is larger than {robot.name} is rated for",
                 parameter="wrench",
-                came=f"{came:.4g} {unit}",
+                came=f"{value:.4g} {unit}",
                 allowed=f"up to {most:.4g} {unit}, of a rated load of {robot.rated_load:g} kg",
                 cure=cure,
             )
@@ -534,9 +534,10 @@ def fitted_from(calibrated: Robot, robot: Robot) -> bool:
     if not _near(table, _flange(robot, q, {})):
         return False
     began = {name: replace(p, value=p.nominal) for name, p in calibrated.known.items()}
-    now = _flange(robot, q, robot.known)
+    current = _flange(robot, q, robot.known)
     return any(
-        _near(now, one) for one in (table, _flange(calibrated, q, began), _flange(calibrated, q, calibrated.known))
+        _near(current, reference)
+        for reference in (table, _flange(calibrated, q, began), _flange(calibrated, q, calibrated.known))
     )
 
 
@@ -547,5 +548,5 @@ def _flange(robot: Robot, joints: Array, known: Mapping[str, Parameter]) -> Arra
     return np.concatenate([rotation, position[:, :, None]], axis=2)
 
 
-def _near(one: Array, other: Array) -> bool:
-    return bool(np.abs(one - other).max(initial=0.0) < _NEAR)
+def _near(first: Array, other: Array) -> bool:
+    return bool(np.abs(first - other).max(initial=0.0) < _NEAR)

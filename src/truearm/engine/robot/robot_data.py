@@ -11,7 +11,7 @@ from typing import Final, Self, TypeVar
 import numpy as np
 
 from truearm.engine.base.errors import InputError, as_html, counted, did_you_mean, listed, short_text
-from truearm.engine.base.units import Marked, said_of
+from truearm.engine.base.units import Marked, mark_lines
 from truearm.engine.robot.balancers import Balancer
 from truearm.engine.robot.bearings import AxialSlides, bearing_elements, carried_by
 from truearm.engine.robot.chain import Chain, Element, Offset, across, axis_of, slide_along, turn_about
@@ -90,7 +90,7 @@ class RobotData:
     def __repr__(self) -> str:
         changed = sum(p.value != p.nominal for p in self.parameters.values())
         lines = [
-            *said_of(self.simulated_from),
+            *mark_lines(self.simulated_from),
             f"{self.name}: {self.title}",
             f"{counted(len(self.joints), 'joint')} ({self.convention_name}), "
             f"{changed} of {counted(len(self.parameters), 'parameter')} not at the nominal value",
@@ -206,11 +206,11 @@ class RobotData:
     @cached_property
     def offset_elements(self) -> Mapping[str, tuple[tuple[int, float], ...]]:
         """The elements of the trunk that follow a parameter of another one, by its name, with their factors."""
-        found: dict[str, tuple[tuple[int, float], ...]] = {}
+        elements: dict[str, tuple[tuple[int, float], ...]] = {}
         for place, element in enumerate(self.trunk.elements):
             for name, factor, _ in element.offsets:
-                found[name] = (*found.get(name, ()), (place, factor))
-        return found
+                elements[name] = (*elements.get(name, ()), (place, factor))
+        return elements
 
     @cached_property
     def layout(self) -> Layout:

@@ -75,9 +75,9 @@ def rotation_from_vector(v: Array) -> Array:
 
 def homogeneous(R: Array, p: Array) -> Array:
     """Return matrices ``(n, 4, 4)`` of rotations ``(n, 3, 3)`` and positions ``(n, 3)`` [m]."""
-    made = np.zeros((len(p), 4, 4))
-    made[:, :3, :3], made[:, :3, 3], made[:, 3, 3] = R, p, 1.0
-    return made
+    matrix = np.zeros((len(p), 4, 4))
+    matrix[:, :3, :3], matrix[:, :3, 3], matrix[:, 3, 3] = R, p, 1.0
+    return matrix
 
 
 def fixed_rotation(quaternion: Sequence[float]) -> tuple[Element, ...]:
@@ -112,9 +112,9 @@ class Transform:
     @property
     def matrix(self) -> Array:
         """Homogeneous matrix ``(4, 4)`` [m]."""
-        made = np.eye(4)
-        made[:3, :3], made[:3, 3] = self.rotation, self.translation
-        return made
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.rotation, self.translation
+        return matrix
 
 
 IDENTITY: Final = Transform()
@@ -223,11 +223,11 @@ def _nearest_zyx(R: Array, near: Array) -> Array:
     # With the first turn undone the rest is Ry(B) Rx(C), whose second row is 0, cos C, -sin C.
     undone = turned_about(2, -first) @ R
     last = np.where(locked, np.arctan2(-undone[:, 1, 2], undone[:, 1, 1]), last)
-    one = np.stack([first, middle, last], axis=1)
+    solution = np.stack([first, middle, last], axis=1)
     other = np.stack([first + np.pi, np.pi - middle, last + np.pi], axis=1)
-    one, other = (angles + _TURN * np.round((near - angles) / _TURN) for angles in (one, other))
-    other_is_nearer = np.abs(other - near).sum(axis=1) < np.abs(one - near).sum(axis=1)
-    return np.where((other_is_nearer & ~locked)[:, None], other, one)
+    solution, other = (angles + _TURN * np.round((near - angles) / _TURN) for angles in (solution, other))
+    other_is_nearer = np.abs(other - near).sum(axis=1) < np.abs(solution - near).sum(axis=1)
+    return np.where((other_is_nearer & ~locked)[:, None], other, solution)
 
 
 def _matrices_of_fixed_xyz(numbers: Array) -> Array:

@@ -85,28 +85,28 @@ def read_kinematics(path: Path) -> FactoryKinematics:
 
 
 def _conf(text: str, path: Path) -> FactoryKinematics:
-    section, found = "", dict[str, tuple[int, str]]()
+    section, entries = "", dict[str, tuple[int, str]]()
     for number, line in enumerate(text.splitlines(), 1):
         words = line.partition("#")[0].strip()
         head, entry = _SECTION.fullmatch(words), _ENTRY.fullmatch(words)
         if head is not None:
             section = head[1]
         elif section in ("", "mounting") and entry is not None:
-            if entry[1] in found:
+            if entry[1] in entries:
                 raise InputError("an entry is given twice", where=f"{path}, line {number}", came=entry[1], cure=_CURE)
-            found[entry[1]] = (number, entry[2].strip())
+            entries[entry[1]] = (number, entry[2].strip())
     deltas = {}
     for column, (name, unit) in _DELTAS.items():
-        if name not in found:
+        if name not in entries:
             raise InputError(
                 "a list is missing, so the file is not whole",
                 where=str(path),
-                came=", ".join(found) or "no entries",
+                came=", ".join(entries) or "no entries",
                 allowed=f"{', '.join(listed for listed, _ in _DELTAS.values())}, of {JOINTS} numbers each",
                 cure=_CURE,
             )
-        deltas[column] = _numbers(*found[name], name, unit, path)
-    status = found.get("calibration_status", (0, _IN_USE))
+        deltas[column] = _numbers(*entries[name], name, unit, path)
+    status = entries.get("calibration_status", (0, _IN_USE))
     if status[1] != _IN_USE:
         raise InputError(
             "the controller does not compute with these kinematics as they stand",
@@ -115,7 +115,7 @@ def _conf(text: str, path: Path) -> FactoryKinematics:
             allowed=f"{_IN_USE}, linearised",
             cure="Let the arm be calibrated by its maker, and copy the file again.",
         )
-    identity = {name: found[name][1].strip("[] ") for name in _IDENTITY if name in found}
+    identity = {name: entries[name][1].strip("[] ") for name in _IDENTITY if name in entries}
     _check_identity(identity, path)
     return FactoryKinematics(path, deltas, None, identity)
 
@@ -186,11 +186,11 @@ def _ros(path: Path) -> FactoryKinematics:
 def _about(axis: int, angle: float) -> Array:
     """Return the turn about an axis of a frame, ``(3, 3)``."""
     c, s = math.cos(angle), math.sin(angle)
-    made = np.eye(3)
+    rotation = np.eye(3)
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    made[i, i] = made[j, j] = c
-    made[i, j], made[j, i] = -s, s
-    return made
+    rotation[i, i] = rotation[j, j] = c
+    rotation[i, j], rotation[j, i] = -s, s
+    return rotation
 
 
 def _check_identity(identity: Mapping[str, str], path: Path) -> None:
@@ -232,7 +232,7 @@ def controller_robot(robot: Robot) -> Robot:
     return _with_rows(replace(robot, known={}), rows) if rows else robot
 
 
-def with_kinematics(type_: Robot, found: FactoryKinematics) -> Robot:
+def with_kinematics(type_: Robot, factory: FactoryKinematics) -> Robot:
     """Return the robot of a type with the kinematics of a file as its values, and as those of its controller.
 
     The nominal values, masses, tools and limits are those of the type. The frames of links lie beside the type's.
@@ -242,7 +242,7 @@ def with_kinematics(type_: Robot, found: FactoryKinematics) -> Robot:
             an arm with other joints.
     """
     plain = _plain(type_)
-    if found.frames is None:
+    if factory.frames is None:
         if any(joint.row.get("beta") for joint in plain.joints):
             raise InputError(
                 "the file has differences to the table of a type, and this robot's table is no such one",
@@ -251,27 +251,27 @@ def with_kinematics(type_: Robot, found: FactoryKinematics) -> Robot:
                 cure="Give the type as the library has it.",
             )
         table = [
-            {column: joint.row.get(column, 0.0) + found.deltas[column][number] for column in found.deltas}
+            {column: joint.row.get(column, 0.0) + factory.deltas[column][number] for column in factory.deltas}
             for number, joint in enumerate(plain.joints)
         ]
         measured = replace(plain, convention_name="standard-dh", joints=_joints(plain, table))
     else:
-        measured = replace(plain, convention_name="urdf", joints=_joints(plain, [_origin(f) for f in found.frames]))
+        measured = replace(plain, convention_name="urdf", joints=_joints(plain, [_origin(f) for f in factory.frames]))
     placed = converted(measured, "hayati")
     offset = np.abs(placed.base.matrix - np.eye(4)).max()
     if offset > _SAME or placed.flange != IDENTITY:
         raise InputError(
             "the first axis is not the z axis of the base frame, as it is in every arm of this kind",
-            where=str(found.path),
+            where=str(factory.path),
             cure="Take the file that the controller or its ROS driver wrote.",
         )
     rows = tuple({column: float(value) for column, value in joint.row.items()} for joint in placed.joints)
-    kinematics = ControllerKinematics("own", rows, found.path.name, found.identity)
+    kinematics = ControllerKinematics("own", rows, factory.path.name, factory.identity)
     return replace(
         _with_rows(replace(type_, known={}, proof=None), rows),
         title=f"{type_.title}, with the kinematics of its controller",
         controller=replace(type_.controller, kinematics=kinematics),
-        history=(*type_.history, f"kinematics of the controller from {found.path.name}"),
+        history=(*type_.history, f"kinematics of the controller from {factory.path.name}"),
     )
 
 
@@ -281,19 +281,19 @@ def _with_rows(robot: Robot, rows: Sequence[Mapping[str, float]]) -> Robot:
         replace(joint, row={**dict.fromkeys(row, 0.0), **joint.row})
         for joint, row in zip(robot.joints, rows, strict=True)
     )
-    made = replace(robot, convention_name="hayati", joints=joints, truths={})
-    return made.with_values(
+    result = replace(robot, convention_name="hayati", joints=joints, truths={})
+    return result.with_values(
         {f"{column}_{number}": value for number, row in enumerate(rows, 1) for column, value in row.items()}
     )
 
 
-def refuse_far(made: Robot, type_: Robot, where: str) -> None:
+def refuse_far(robot: Robot, type_: Robot, where: str) -> None:
     """Refuse kinematics of an arm of another type than `type_`, or of none.
 
     Raises:
         InputError: With how far the flange is from the nominal one on average, or how far it is turned; or a link.
     """
-    apart, turned = mean_distance(made, type_), mean_angle(made, type_)
+    apart, turned = mean_distance(robot, type_), mean_angle(robot, type_)
     if not apart <= MOST_APART:
         raise InputError(
             "these are the kinematics of another type of robot",
@@ -310,7 +310,7 @@ def refuse_far(made: Robot, type_: Robot, where: str) -> None:
             allowed=f"{np.degrees(MOST_TURNED):.2g} deg",
             cure="Copy the file from the controller again, whole.",
         )
-    pairs = zip(_link_frames(_bare(made)), _link_frames(_plain(type_)), strict=True)
+    pairs = zip(_link_frames(_bare(robot)), _link_frames(_plain(type_)), strict=True)
     for number, (ours, theirs) in enumerate(pairs, 1):
         gap = float(np.linalg.norm(ours[:3, 3] - theirs[:3, 3]))
         turned = float(_angles(ours[:3, :3], theirs[:3, :3]))
@@ -324,23 +324,23 @@ def refuse_far(made: Robot, type_: Robot, where: str) -> None:
             )
 
 
-def mean_distance(made: Robot, type_: Robot) -> float:
+def mean_distance(robot: Robot, type_: Robot) -> float:
     """Return how far the flange of an arm is from that of a type on average, at random joint positions [m]."""
-    (ours, _), (theirs, _) = _flanges(made, type_)
+    (ours, _), (theirs, _) = _flanges(robot, type_)
     return float(np.linalg.norm(ours - theirs, axis=1).mean())
 
 
-def mean_angle(made: Robot, type_: Robot) -> float:
+def mean_angle(robot: Robot, type_: Robot) -> float:
     """Return how far the flange of an arm is turned from that of a type on average, at random joint positions [rad]."""
-    (_, ours), (_, theirs) = _flanges(made, type_)
+    (_, ours), (_, theirs) = _flanges(robot, type_)
     return float(_angles(ours, theirs).mean())
 
 
-def _flanges(made: Robot, type_: Robot) -> list[tuple[Array, Array]]:
+def _flanges(own: Robot, type_: Robot) -> list[tuple[Array, Array]]:
     """Return positions ``(n, 3)`` [m] and rotations ``(n, 3, 3)`` of the flange of both, at random joint positions."""
     joints = np.random.default_rng(0).uniform(-np.pi, np.pi, (_CONFIGURATIONS, JOINTS))
     plain = _plain(type_)  # refuses a type of another kind before anything is compared
-    return [robot.world_poses(joints) for robot in (_bare(made), plain)]
+    return [robot.world_poses(joints) for robot in (_bare(own), plain)]
 
 
 def _angles(ours: Array, theirs: Array) -> Array:
@@ -435,19 +435,19 @@ def kinematics_text(robot: Robot) -> tuple[str, list[str]]:
         numbers = [*frame[:3, 3], *roll_pitch_yaw(frame[:3, :3])]
         entries = zip(("x", "y", "z", "roll", "pitch", "yaw"), numbers, strict=True)
         lines += [f"  {link}:", *(f"    {name}: {_number(value)}" for name, value in entries)]
-    said = [
+    messages = [
         *masses_left_out(robot, KINEMATICS_FILE),
         *_flange_left_out(behind),
         f"{KINEMATICS_FILE} of the factory has the hash of what the controller has. The hash of this one is that of "
         "its own numbers: the driver says that they are not the controller's, which is true.",
     ]
     text = "\n".join(lines)
-    return f"{text}\n  hash: truearm_{hashlib.sha256(text.encode()).hexdigest()[:16]}\n", said
+    return f"{text}\n  hash: truearm_{hashlib.sha256(text.encode()).hexdigest()[:16]}\n", messages
 
 
 def _refuse_other_arm(robot: Robot) -> None:
     axes = joint_axes(robot) if all(joint.kind == "revolute" for joint in robot.joints) else []
-    between = [float(np.degrees(one.angle(other))) for one, other in pairwise(axes)]
+    between = [float(np.degrees(axis.angle(other))) for axis, other in pairwise(axes)]
     if len(axes) == JOINTS and all(abs(a - b) < _WITHIN for a, b in zip(between, _BETWEEN, strict=True)):
         return
     raise InputError(

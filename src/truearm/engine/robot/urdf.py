@@ -321,10 +321,10 @@ _ATTRIBUTE: Final = re.compile(rb"""\s+(?P<name>[^\s=]+)\s*=\s*["'](?P<value>(?<
 def _own_links(tree: Tree, robot: Robot) -> list[_Link]:
     """Return the chain of `robot` in the file, or refuse a file that is not the robot's own."""
 
-    def refuse(what: str, came: object = None, allowed: str | None = None) -> InputError:
+    def refuse(fault: str, came: object = None, allowed: str | None = None) -> InputError:
         cure = "Give the URDF that the robot was read from; for another robot a new URDF can be written."
         return InputError(
-            f"the file is not the one this robot was read from: {what}",
+            f"the file is not the one this robot was read from: {fault}",
             where=tree.where,
             came=came,
             allowed=allowed,

@@ -74,10 +74,10 @@ class Tree:
     @cached_property
     def _below(self) -> Mapping[str, list[UrdfJoint]]:
         """The joints that hang on each link."""
-        found: dict[str, list[UrdfJoint]] = {link: [] for link in self.links}
+        children: dict[str, list[UrdfJoint]] = {link: [] for link in self.links}
         for joint in self.joints.values():
-            found[joint.parent].append(joint)
-        return found
+            children[joint.parent].append(joint)
+        return children
 
     def joints_to(self, link: str) -> list[UrdfJoint]:
         """Return the joints from the root to a link."""
@@ -92,12 +92,12 @@ class Tree:
 
     def fixed_behind(self, link: str) -> list[tuple[str, Array]]:
         """Return a link and all that is fixed to it further out, with their frames in it ``(4, 4)``."""
-        found = [(link, np.eye(4))]
-        for name, frame in found:
+        frames = [(link, np.eye(4))]
+        for name, frame in frames:
             for joint in self._below[name]:
                 if joint.type == "fixed":
-                    found.append((joint.child, frame @ placement(*origin(joint.tag, joint.where))))
-        return found
+                    frames.append((joint.child, frame @ placement(*origin(joint.tag, joint.where))))
+        return frames
 
     def end(self, joint: UrdfJoint) -> str:
         """Return the link that is the end of a robot whose last moving joint is `joint`."""
@@ -195,10 +195,10 @@ def _urdf_joint(tag: Tag, name: str, where: str) -> UrdfJoint:
         raise InputError("a joint's type is not one of URDF's", where=where, came=type_, allowed=", ".join(_TYPES))
     ends = []
     for end in ("parent", "child"):
-        found = child_tag(tag, end, where)
-        if found is None or "link" not in found.attributes:
+        end_tag = child_tag(tag, end, where)
+        if end_tag is None or "link" not in end_tag.attributes:
             raise InputError(f'the joint has no <{end} link="..."/>', where=where)
-        ends.append(found.attributes["link"])
+        ends.append(end_tag.attributes["link"])
     return UrdfJoint(name, type_, ends[0], ends[1], tag, where)
 
 
@@ -225,8 +225,8 @@ def _root(tree: Tree) -> str:
     reached = list(roots)
     for link in reached:
         reached += tree.children(link)
-    found = set(reached)
-    lost = [link for link in tree.links if link not in found]
+    linked = set(reached)
+    lost = [link for link in tree.links if link not in linked]
     if lost:
         raise InputError("the links form a loop that no root leads to", where=tree.where, came=", ".join(lost))
     if not roots:
@@ -248,15 +248,15 @@ def numbers(tag: Tag, attribute: str, count: int, where: str) -> tuple[float, ..
     if text is None:
         return None
     words = re.findall(r"[^ \t\r\n]+", text)
-    found = [value for value in map(as_number, words) if value is not None]
-    if len(words) != count or len(found) != count:
+    values = [value for value in map(as_number, words) if value is not None]
+    if len(words) != count or len(values) != count:
         raise InputError(
             f"bad numbers in <{tag.name} {attribute}>",
             where=where,
             came=text,
             allowed="one number" if count == 1 else f"{count} numbers with spaces between",
         )
-    return tuple(sized_si(value, "1", f"{where}, <{tag.name} {attribute}>", came=text) for value in found)
+    return tuple(sized_si(value, "1", f"{where}, <{tag.name} {attribute}>", came=text) for value in values)
 
 
 def triple(values: Iterable[float]) -> Triple:
@@ -267,19 +267,19 @@ def triple(values: Iterable[float]) -> Triple:
 
 def origin(tag: Tag, where: str) -> tuple[Triple, Triple]:
     """Return xyz [m] and rpy [rad] of the ``<origin>`` in a joint or an inertial."""
-    found = child_tag(tag, "origin", where)
-    if found is None:
+    entry = child_tag(tag, "origin", where)
+    if entry is None:
         return ZERO, ZERO
-    xyz, rpy = (numbers(found, attribute, 3, where) or ZERO for attribute in ("xyz", "rpy"))
+    xyz, rpy = (numbers(entry, attribute, 3, where) or ZERO for attribute in ("xyz", "rpy"))
     return triple(xyz), triple(rpy)
 
 
 def product(elements: Iterable[Element], values: Mapping[str, float] | None = None) -> Array:
     """Return the product of elements without variables, ``(4, 4)``."""
     kinematics = Chain(tuple(elements)).forward_kinematics(np.zeros((0, 1)), values)
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = kinematics.matrix()[0], kinematics.position[:, 0]
-    return made
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = kinematics.matrix()[0], kinematics.position[:, 0]
+    return matrix
 
 
 def placement(xyz: Triple, rpy: Triple) -> Array:

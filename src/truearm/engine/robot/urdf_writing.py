@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from truearm.engine.base.errors import InputError
-from truearm.engine.base.units import said_of, written
+from truearm.engine.base.units import mark_lines, written
 from truearm.engine.robot.chain import Array, Element
 from truearm.engine.robot.controller import Controller, JointsOf
 from truearm.engine.robot.effects.balancing import Balancing
@@ -25,31 +25,31 @@ from truearm.engine.robot.urdf_tree import Triple, product, roll_pitch_yaw
 _SAME_FRAME: Final = 1e-9
 
 
-def left_out(robot: Robot, format_: str, held: Collection[str] = ()) -> list[str]:
+def left_out(robot: Robot, format_: str, supported: Collection[str] = ()) -> list[str]:
     """Say what of a robot a file cannot hold: joint effects, balancers, the place of the base, targets.
 
     Args:
         format_: What the file is, as a sentence begins: ``A URDF``.
-        held: Names of the joint effects that it holds after all; with that of balancers the balancers themselves.
+        supported: Names of the joint effects that it holds after all; with that of balancers the balancers themselves.
     """
-    said = []
+    messages = []
     for effect in robot.effects:
         names = [plain.name for plain in effect.parameters if robot.values[plain.name] != plain.value]
-        if names and effect.name not in held:
-            said.append(f"{format_} cannot hold the joint effect {effect.name}; left out: {', '.join(names)}.")
-    if robot.balancers and Balancing.name not in held:
+        if names and effect.name not in supported:
+            messages.append(f"{format_} cannot hold the joint effect {effect.name}; left out: {', '.join(names)}.")
+    if robot.balancers and Balancing.name not in supported:
         names = [balancer.name for balancer in robot.balancers]
-        said.append(f"{format_} cannot hold balancers; left out: {', '.join(names)}.")
+        messages.append(f"{format_} cannot hold balancers; left out: {', '.join(names)}.")
     base = [name for name, p in robot.parameters.items() if p.group == "base" and p.value != 0.0]
     if base or robot.base_quaternion != Transform().quaternion:
         names = [*(["base_quaternion"] if robot.base_quaternion != Transform().quaternion else []), *base]
-        said.append(
+        messages.append(
             f"{format_} cannot hold where the base stands in the instrument's frame; left out: {', '.join(names)}."
         )
     if robot.targets:
         names = [target.name for target in robot.targets]
-        said.append(f"{format_} cannot hold the targets on the flange; left out: {', '.join(names)}.")
-    return said
+        messages.append(f"{format_} cannot hold the targets on the flange; left out: {', '.join(names)}.")
+    return messages
 
 
 def masses_left_out(robot: Robot, format_: str) -> list[str]:
@@ -86,14 +86,14 @@ def first_frame_remark(base: Transform) -> str:
 def comments(robot: Robot, frame: str, left: Sequence[str]) -> list[str]:
     """Return what the head of a file says in its comments, each one line without control characters."""
     title = robot.title if robot.title == robot.name else f"{robot.name}: {robot.title}"
-    said = [
-        *said_of(robot.simulated_from),
+    remarks = [
+        *mark_lines(robot.simulated_from),
         f"{title}, written by truearm",
         frame,
         *left,
         *(f"History: {line}" for line in robot.history),
     ]
-    return [" ".join("".join(c if c.isprintable() else " " for c in line).split()) for line in said]
+    return [" ".join("".join(c if c.isprintable() else " " for c in line).split()) for line in remarks]
 
 
 #: What columns are called, before their numbers.
@@ -109,28 +109,28 @@ def joint_names(names: Iterable[str], where: str) -> tuple[JointsOf, list[str]]:
     Raises:
         InputError: If there are columns of both kinds, or none, or a number is missing.
     """
-    found = sorted((int(match[2]), match[1]) for name in names if (match := JOINT_COLUMN.fullmatch(name)))
-    kinds = dict.fromkeys(kind for _, kind in found)
+    numbered = sorted((int(match[2]), match[1]) for name in names if (match := JOINT_COLUMN.fullmatch(name)))
+    kinds = dict.fromkeys(kind for _, kind in numbered)
     if len(kinds) > 1:
         raise InputError(
             "a file has joint positions of one kind",
             where=where,
-            came=", ".join(f"{kind}_{number}" for number, kind in found),
+            came=", ".join(f"{kind}_{number}" for number, kind in numbered),
             allowed="axis_1, axis_2, .. as the controller shows them, or joint_1, joint_2, .. of the robot's model",
             cure="Keep the columns of one kind.",
         )
     kind = next(iter(kinds), COLUMN["model"])
-    there_are = {number for number, _ in found}
+    there_are = {number for number, _ in numbered}
     for number in range(1, max(there_are, default=1) + 1):
         if number not in there_are:
             raise InputError(
                 f"the column {kind}_{number} is missing",
                 where=where,
-                came=", ".join(f"{kind}_{n}" for n, _ in found) or None,
+                came=", ".join(f"{kind}_{n}" for n, _ in numbered) or None,
                 allowed=f"{kind}_1, {kind}_2, .. without a gap",
                 cure=f"Add {kind}_{number} [deg], or with the unit it has, or renumber.",
             )
-    return next(whose for whose, name in COLUMN.items() if name == kind), [f"{kind}_{number}" for number, _ in found]
+    return next(whose for whose, name in COLUMN.items() if name == kind), [f"{kind}_{number}" for number, _ in numbered]
 
 
 def counting(robot: Robot, joints_are: JointsOf) -> Controller | None:
@@ -194,10 +194,10 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
         if names.count(name) > 1:
             raise InputError("a URDF cannot have two joints of one name", where=robot.name, came=name)
     origins, behind = collapsed(robot)
-    said = left_out(robot, "A URDF")
+    messages = left_out(robot, "A URDF")
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
-        *(f"<!-- {line} -->" for line in said_of(robot.simulated_from)),
+        *(f"<!-- {line} -->" for line in mark_lines(robot.simulated_from)),
         f"<robot name={quoteattr(robot.name)}>",
         '  <link name="base_link"/>',
     ]
@@ -208,10 +208,10 @@ def urdf_text(robot: Robot) -> tuple[str, list[str]]:
         lines += _joint_lines(joint, parent, f"link_{number}", place, _limit(robot.name, joint), moving.axis)
     lines += ['  <link name="tool0"/>']
     lines += _joint_lines(None, f"link_{len(robot.joints)}", "tool0", origins[-1], [])
-    said += _unknown_limits(robot.joints)
+    messages += _unknown_limits(robot.joints)
     if robot.masses:
-        said.append("Inertia tensors are not written and stand as 0.")
-    return "\n".join([*lines, "</robot>", ""]), said
+        messages.append("Inertia tensors are not written and stand as 0.")
+    return "\n".join([*lines, "</robot>", ""]), messages
 
 
 def _joint_lines(

@@ -62,12 +62,12 @@ def with_errors_drawn(
     rng: np.random.Generator,
 ) -> dict[int, JointTruth]:
     """Return what is true of the joints with errors drawn for each that turns; a prismatic one stays as it is."""
-    found = dict(joints)
+    changed = dict(joints)
     for number, joint in enumerate(robot.joints, 1):
         if joint.kind == "revolute":
             drawn, known = draw(rng), joints.get(number, PERFECT)
-            found[number] = replace(known, gear=(*known.gear, *drawn.gear), teeth=drawn.teeth, bumps=drawn.bumps)
-    return found
+            changed[number] = replace(known, gear=(*known.gear, *drawn.gear), teeth=drawn.teeth, bumps=drawn.bumps)
+    return changed
 
 
 def _encoder(rng: np.random.Generator) -> tuple[tuple[int, float, float], ...]:

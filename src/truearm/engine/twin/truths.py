@@ -134,7 +134,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         pairs = tuple((of(f"run_out_{a}_sin", number), of(f"run_out_{a}_cos", number)) for a in "xyz")
         return pairs if any(map(any, pairs)) else ()
 
-    made = {
+    truths = {
         number: JointTruth(
             compliance=of("compliance", number),
             quadratic=of("compliance_quadratic", number),
@@ -160,7 +160,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
             came=unknown[0],
             cure="Take it out of the robot file; a simulation would leave it out without a word.",
         )
-    return made
+    return truths
 
 
 def _contact(robot: Robot) -> Contact:

@@ -88,10 +88,10 @@ class Link:
         return replace(self, before=self.before[rows], after=self.after[rows], zero=zero[rows])
 
 
-def stacked(links: Sequence[Link], which: IntArray) -> Link:
-    """Return one link that is at each configuration the one of those links that `which` names."""
-    before, after = (np.array([getattr(link, side) for link in links])[which] for side in ("before", "after"))
-    return replace(links[0], before=before, after=after, zero=np.array([link.zero for link in links])[which])
+def stacked(links: Sequence[Link], indices: IntArray) -> Link:
+    """Return one link that is at each configuration the one of those links that `indices` names."""
+    before, after = (np.array([getattr(link, side) for link in links])[indices] for side in ("before", "after"))
+    return replace(links[0], before=before, after=after, zero=np.array([link.zero for link in links])[indices])
 
 
 def product(elements: Sequence[Element], values: Mapping[str, float], growth: float = 0.0) -> Array:
@@ -267,10 +267,10 @@ def carried(elements: Sequence[Element], place: int, direction: Array, values: M
 
 def directions_at(elements: Sequence[Element], place: int) -> list[Array]:
     """Return the axes of the turning joints before and behind a place, in the frame there; parallel ones once."""
-    found = [axis for forward in (False, True) for axis in _next_axis(elements, place, forward=forward)]
-    if len(found) == 2 and abs(float(found[0] @ found[1])) > _ALIKE:
-        return found[:1]
-    return found
+    axes = [axis for forward in (False, True) for axis in _next_axis(elements, place, forward=forward)]
+    if len(axes) == 2 and abs(float(axes[0] @ axes[1])) > _ALIKE:
+        return axes[:1]
+    return axes
 
 
 def _reached(
@@ -406,8 +406,8 @@ class Twin:
 
     def frames(self, joints: Array, **conditions: Unpack[Conditions]) -> Mapping[str, Array]:
         """Return ``T_world_target`` ``(n, 4, 4)`` of every target at joint positions ``(n, joints)``."""
-        found = [posture.targets for posture in self.postures(joints, **conditions)]
-        return {target.name: np.array([at[target.name] for at in found]) for target in self.robot.targets}
+        postures = [posture.targets for posture in self.postures(joints, **conditions)]
+        return {target.name: np.array([at[target.name] for at in postures]) for target in self.robot.targets}
 
     def postures(self, joints: Array, **conditions: Unpack[Conditions]) -> tuple[Posture, ...]:
         """Return where the twin stands at joint positions ``(n, joints)``.
@@ -420,18 +420,18 @@ class Twin:
             InputError: If joints or conditions have another shape.
         """
         n, count = len(joints), len(self.robot.joints)
-        rest = np.zeros((n, count))
+        zeros = np.zeros((n, count))
         joints = _shaped("joint positions", joints, (n, count))
         approach = _shaped("approach", conditions.get("approach", directions(joints)), (n, count))
         number = None if "number" not in conditions else _shaped("number", conditions["number"], (n,))
         cold = np.zeros(n) if number is None else self._cold_share(number)
         temperature = _shaped("temperature", conditions.get("temperature", np.full(n, REFERENCE_TEMPERATURE)), (n,))
         wrench = _shaped("wrench", conditions.get("wrench", np.zeros((n, 6))), (n, 6))
-        velocity = _shaped("velocity", conditions.get("velocity", rest), (n, count))
-        acceleration = _shaped("acceleration", conditions.get("acceleration", rest), (n, count))
-        given = (joints, approach, temperature - REFERENCE_TEMPERATURE, cold, wrench, velocity, acceleration)
+        velocity = _shaped("velocity", conditions.get("velocity", zeros), (n, count))
+        acceleration = _shaped("acceleration", conditions.get("acceleration", zeros), (n, count))
+        inputs = (joints, approach, temperature - REFERENCE_TEMPERATURE, cold, wrench, velocity, acceleration)
         blocks = (slice(first, first + _BLOCK) for first in range(0, n, _BLOCK))
-        return tuple(posture for block in blocks for posture in self._settled(*(values[block] for values in given)))
+        return tuple(posture for block in blocks for posture in self._settled(*(values[block] for values in inputs)))
 
     def _cold_share(self, number: Array) -> Array:
         """Return how much of the growth is still to come behind some configurations: ``exp(-rate number)``, bounded."""
@@ -456,29 +456,29 @@ class Twin:
         aside = np.stack([truth.carried_aside(joints[:, j]) for j, truth in enumerate(truths)], axis=1)
 
         def deflections(rows: IntArray, loads: Array, fall: Array) -> Array:
-            found = np.zeros((len(rows), len(links), 3))
+            deflected = np.zeros((len(rows), len(links), 3))
             for j, (truth, link) in enumerate(zip(truths, links, strict=True)):
                 if truth is not PERFECT:
-                    found[:, j, :2] = np.transpose(truth.tilt(loads[:, j, 3], loads[:, j, 4], self.contact))
+                    deflected[:, j, :2] = np.transpose(truth.tilt(loads[:, j, 3], loads[:, j, 4], self.contact))
                     along = loads[:, j, 5 if link.turns else 2]
-                    found[:, j, 2] = truth.turn(joints[rows, j], approach[rows, j], along)
-                    found[:, j] += truth.bent(fall[:, j])
-            return found
+                    deflected[:, j, 2] = truth.turn(joints[rows, j], approach[rows, j], along)
+                    deflected[:, j] += truth.bent(fall[:, j])
+            return deflected
 
         left = np.arange(len(joints))
         nothing = np.zeros((len(left), len(links), 6))
-        settled, found = deflections(left, nothing, nothing[:, :, :3]), dict[int, Posture]()
+        settled, settled_postures = deflections(left, nothing, nothing[:, :, :3]), dict[int, Posture]()
         for last in (*[False] * (_ROUNDS - 1), True):
             deflection, own = settled, tuple(link.of_rows(left) for link in links)
             given = (aside[left], wrench[left], velocity[left], acceleration[left])
             standing = self._standing(own, geared[left], deflection, *given)
             settled = deflections(left, standing.loads, standing.fall)
             rests = (np.abs(settled - deflection).max(axis=(1, 2)) < _SETTLED) | last
-            found |= {int(left[row]): standing.of_row(row) for row in np.flatnonzero(rests).tolist()}
+            settled_postures |= {int(left[row]): standing.of_row(row) for row in np.flatnonzero(rests).tolist()}
             left, settled = left[~rests], settled[~rests]
             if len(left) == 0:
                 break
-        return [found[row] for row in range(len(joints))]
+        return [settled_postures[row] for row in range(len(joints))]
 
     def _standing(
         self,
@@ -533,20 +533,20 @@ class Twin:
         every = [np.broadcast_to(np.eye(4), frames[0].shape), *frames]
         for number, balancer in enumerate(self.robot.balancers, 1):
             ends = (balancer.fixed, balancer.moving)
-            one, other = ((every[end.link] @ [*self._stayed(end.link, end.point), 1.0])[:, :3] for end in ends)
-            length = np.linalg.norm(one - other, axis=1)[:, None]
+            first, other = ((every[end.link] @ [*self._stayed(end.link, end.point), 1.0])[:, :3] for end in ends)
+            length = np.linalg.norm(first - other, axis=1)[:, None]
             pull = balancer.force + balancer.stiffness * (length - balancer.length)
             pull = pull * self.robot.values.get(f"balancer_{number}", 1.0)
-            towards = np.concatenate([pull / length * (one - other), np.zeros(one.shape)], axis=1)
-            yield (ends[0].link, ends[1].link), (forces_of(-towards, one), forces_of(towards, other))
+            towards = np.concatenate([pull / length * (first - other), np.zeros(first.shape)], axis=1)
+            yield (ends[0].link, ends[1].link), (forces_of(-towards, first), forces_of(towards, other))
 
     def _links(self, warmer: Array, cold: Array) -> tuple[Link, ...]:
         """Return the links of an arm some kelvin warmer than the reference, a share of whose warming up is to come."""
         links = list(self._plain)
         for number, truth in self.joints.items():
-            growths, which = np.unique(truth.growth * warmer - truth.warm_up * cold, return_inverse=True)
+            growths, indices = np.unique(truth.growth * warmer - truth.warm_up * cold, return_inverse=True)
             if growths.any():
-                links[number - 1] = stacked([self._link(number, growth) for growth in growths.tolist()], which)
+                links[number - 1] = stacked([self._link(number, growth) for growth in growths.tolist()], indices)
         return tuple(links)
 
     def _link(self, number: int, growth: float) -> Link:
@@ -556,7 +556,7 @@ class Twin:
     @cached_property
     def _places(self) -> tuple[tuple[float, tuple[LinkMass, ...]], ...]:
         """How far along its axis each joint's bearing lies, and the masses of its link with nominal slides."""
-        links, found = self.robot.link_elements, []
+        links, places = self.robot.link_elements, []
         every = [element for link in links for element in link]
         for number, link in enumerate(links, 1):
             own = next(i for i, element in enumerate(link) if element.variable is not None)
@@ -566,8 +566,8 @@ class Twin:
                 passed = carried(every, sum(map(len, links[: number - 1])) + own, along, self.robot.values)
                 bearing = (self.robot.joints[number - 1].bearing or 0.0) - passed
             masses = (replace(m, cog=self._stayed(number, m.cog)) for m in self.robot.masses if m.joint == number)
-            found.append((bearing, tuple(masses)))
-        return tuple(found)
+            places.append((bearing, tuple(masses)))
+        return tuple(places)
 
     def _stayed(self, number: int, point: tuple[float, float, float]) -> tuple[float, float, float]:
         """Return a point of a link given with nominal slides, in the link's frame."""
@@ -664,14 +664,14 @@ def measure(
 
 def with_wrench_read(twin: Twin, data: Dataset) -> Dataset:
     """Return readings of a twin with what acted on its flange at each configuration, as a force sensor there says."""
-    given = {"approach": data.approach, "number": data.number, "temperature": data.temperature}
-    conditions: Conditions = {name: values for name, values in given.items() if values is not None}  # type: ignore[assignment]
+    columns = {"approach": data.approach, "number": data.number, "temperature": data.temperature}
+    conditions: Conditions = {name: values for name, values in columns.items() if values is not None}  # type: ignore[assignment]
     return replace(data, wrench=np.array([at.wrench for at in twin.postures(data.joints, **conditions)]))
 
 
-def _shaped(what: str, values: Array, shape: tuple[int, ...]) -> Array:
+def _shaped(name: str, values: Array, shape: tuple[int, ...]) -> Array:
     if np.shape(values) != shape:
         raise InputError(
-            f"wrong number of values: {what}", came=f"an array of shape {np.shape(values)}", allowed=str(shape)
+            f"wrong number of values: {name}", came=f"an array of shape {np.shape(values)}", allowed=str(shape)
         )
     return np.asarray(values, float)

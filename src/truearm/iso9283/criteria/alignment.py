@@ -129,13 +129,13 @@ def read_alignment(path: Path) -> Alignment:
     return Alignment(content.kind, Transform((x, y, z), (qw, qx, qy, qz)), sigma, sigma_rot)
 
 
-def refuse_implausible(tie: Alignment, cube: Cube, measured: Array, where: str) -> None:
+def refuse_implausible(tie: Alignment, cube: Cube, measured: Array, location: str) -> None:
     """Refuse a tie with which what was measured does not lie near the cube of the tests.
 
     Args:
         cube: In which all poses and paths lie.
         measured: Positions in the instrument's frame [m], ``(n, 3)``.
-        where: The file of the tie.
+        location: The file of the tie.
 
     Raises:
         InputError: If half of the positions lie farther from the cube's centre than its side. The message says which
@@ -146,25 +146,33 @@ def refuse_implausible(tie: Alignment, cube: Cube, measured: Array, where: str) 
     def away(place: Transform) -> float:
         return float(np.abs(place.rotation @ middle + np.array(place.translation) - cube.centre).max())
 
-    given = tie.T_base_instrument
-    if not away(given) > cube.side:
+    instrument_pose = tie.T_base_instrument
+    if not away(instrument_pose) > cube.side:
         return
-    x, y, z = given.translation
-    w, i, j, k = given.quaternion
+    x, y, z = instrument_pose.translation
+    w, i, j, k = instrument_pose.quaternion
     cures = [
-        (Transform((f * x, f * y, f * z), given.quaternion), f"Is the position in {unit}? Then say so under units.")
+        (
+            Transform((f * x, f * y, f * z), instrument_pose.quaternion),
+            f"Is the position in {unit}? Then say so under units.",
+        )
         for f, unit in ((1e3, "m where the file says mm"), (1e-3, "mm where the file says m"))
     ]
-    inverse = Transform.from_matrix(given.rotation.T, -given.rotation.T @ np.array(given.translation))
+    inverse = Transform.from_matrix(
+        instrument_pose.rotation.T, -instrument_pose.rotation.T @ np.array(instrument_pose.translation)
+    )
     cures += [
         (inverse, "Is this the base in the instrument's frame? The instrument's frame in the base frame belongs here."),
-        (Transform(given.translation, (k, w, i, j)), "Does the quaternion begin with x? It begins with w: w, x, y, z."),
+        (
+            Transform(instrument_pose.translation, (k, w, i, j)),
+            "Does the quaternion begin with x? It begins with w: w, x, y, z.",
+        ),
     ]
     fitting = [cure for place, cure in cures if away(place) <= cube.side / 2]
     raise InputError(
         "with this tie of the instrument to the base, what was measured lies far from the cube of the tests",
-        where=where,
-        came=Words(f"{away(given) * 1e3:.4g} mm from its centre"),
+        where=location,
+        came=Words(f"{away(instrument_pose) * 1e3:.4g} mm from its centre"),
         allowed=f"up to {cube.side * 1e3:.4g} mm",
         cure=fitting[0] if fitting else "Check its numbers and units, and those of the files that were measured.",
     )

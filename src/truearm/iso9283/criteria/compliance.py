@@ -68,9 +68,10 @@ def evaluate_pushes(
         along = np.zeros(3)
         along["xyz".index(direction[1])] = 1.0 if direction[0] == "+" else -1.0
         way = pushes.position @ (turn.T @ along)
-        mine = pushes.direction.are(direction)
+        in_direction = pushes.direction.are(direction)
         chosen = [
-            (int(cycle), np.flatnonzero(mine & (pushes.cycle == cycle))) for cycle in np.unique(pushes.cycle[mine])
+            (int(cycle), np.flatnonzero(in_direction & (pushes.cycle == cycle)))
+            for cycle in np.unique(pushes.cycle[in_direction])
         ]
         push_lines = [_line(pushes, direction, cycle, rows, way, turn, instrument.sigma) for cycle, rows in chosen]
         slopes = np.array([line.slope for line in push_lines])
@@ -117,8 +118,8 @@ def _line(
     about = force - force.mean()
     moved = way[rows]
     slope = float(about @ moved / (about @ about))
-    rest = float(moved.mean() - slope * force.mean())
-    scatter = max(float(np.std(moved - rest - slope * force)), sigma)
+    intercept = float(moved.mean() - slope * force.mean())
+    scatter = max(float(np.std(moved - intercept - slope * force)), sigma)
     if slope < -_AGAINST * scatter / _spread(force):
         raise InputError(
             f"the tip moves against the force in cycle {cycle} of the direction {direction}",
@@ -127,7 +128,7 @@ def _line(
             cure="Check the sign of the direction, and how the instrument was tied to the robot's base.",
         )
     slopes = about @ (pushes.position[rows] - pushes.position[rows].mean(axis=0)) @ turn.T / (about @ about)
-    return PushLine(direction, cycle, force, moved - rest, slope, slopes, pushes.line[rows])
+    return PushLine(direction, cycle, force, moved - intercept, slope, slopes, pushes.line[rows])
 
 
 def _check(plan: PerformancePlan, pushes: Pushes, directions: tuple[str, ...]) -> None:
@@ -178,36 +179,38 @@ class OutlyingPush:
 
 def outlying_pushes(lines: Sequence[PushLine], instrument: Instrument) -> tuple[OutlyingPush, ...]:
     """Return pushes that are further off their line than all others by more than scatter does, one a line."""
-    lines = [one for one in lines if len(one.force) >= _LEAST_FORCES]
+    lines = [line for line in lines if len(line.force) >= _LEAST_FORCES]
     if not lines:
         return ()
-    off = [_off(one.force, one.displacement) for one in lines]
+    off = [_off(candidate.force, candidate.displacement) for candidate in lines]
     scatter = max(1.4826 * float(np.median(np.concatenate(off))), instrument.least_scatter(_LEAST_SCATTER)[0], 1e-12)
-    order = np.argsort([-one.max() for one in off], kind="stable")
+    order = np.argsort([-distances.max() for distances in off], kind="stable")
     outlying = 0
     for k in range(1, max(1, len(lines) // 3) + 1):
         chosen = order[:k]
-        left = [float(off[one].max()) for one in order[k:]]
-        left += [float(_off(*_without(lines[one], int(off[one].argmax()))).max()) for one in chosen]
+        left = [float(off[index].max()) for index in order[k:]]
+        left += [float(_off(*_without(lines[index], int(off[index].argmax()))).max()) for index in chosen]
         if off[chosen[-1]].max() > max(_FAR * scatter, _BEYOND * max(left)):
             outlying = k
-    slopes = {one.direction: [other.slope for other in lines if other.direction == one.direction] for one in lines}
-    found = []
+    slopes = {line.direction: [other.slope for other in lines if other.direction == line.direction] for line in lines}
+    outliers = []
     for number in sorted(order[:outlying]):
-        one, row = lines[number], int(off[number].argmax())
-        force, moved = _without(one, row)
-        slope, rest = np.polyfit(force, moved, 1)
-        mine = slopes[one.direction]
-        value = float(np.mean(mine))
-        away = float(abs(one.displacement[row] - rest - slope * one.force[row]))
-        without = value + (float(slope) - one.slope) / len(mine)
-        line = int(one.line[row])
-        found.append(OutlyingPush(one.direction, one.cycle, line, float(one.force[row]), away, value, without))
-    return tuple(found)
+        push, row = lines[number], int(off[number].argmax())
+        force, moved = _without(push, row)
+        slope, intercept = np.polyfit(force, moved, 1)
+        slopes_alike = slopes[push.direction]
+        value = float(np.mean(slopes_alike))
+        away = float(abs(push.displacement[row] - intercept - slope * push.force[row]))
+        without = value + (float(slope) - push.slope) / len(slopes_alike)
+        file_line = int(push.line[row])
+        outliers.append(
+            OutlyingPush(push.direction, push.cycle, file_line, float(push.force[row]), away, value, without)
+        )
+    return tuple(outliers)
 
 
-def _without(one: PushLine, row: int) -> tuple[Array, Array]:
-    return np.delete(one.force, row), np.delete(one.displacement, row)
+def _without(push: PushLine, row: int) -> tuple[Array, Array]:
+    return np.delete(push.force, row), np.delete(push.displacement, row)
 
 
 def _off(force: Array, moved: Array) -> Array:

@@ -34,7 +34,7 @@ _NOTHING = 1e-9
 _LEAST_OUTSIDE = 4
 #: Beyond this share of that part of a side the tip keeps its line; so many steps on either side of the nearest tell how
 #: far samples are apart at the corner.
-_KEPT, _ABOUT = 0.8, 2
+_STRAIGHT_SHARE, _ABOUT = 0.8, 2
 #: Positions are straight lines through samples within this share of the least distance: on an arc that changes the
 #: distance by less than half a percent.
 _SMOOTHED = 0.2
@@ -97,17 +97,19 @@ def corner_values(
     curves: list[CornerCurves] = []
     for run in runs_of(plan, samples, transform, "CR"):
         for number in range(1, len(run.path.vertices) - 1):
-            here = _corner(run, number, max(plan.limit_band, 3 * instrument.sigma), instrument.sigma)
-            curves.append(here)
-            for id_, lengths, sparse in zip(("CR", "CO"), (here.rounding, here.overshoot), here.sparse, strict=True):
+            corner = _corner(run, number, max(plan.limit_band, 3 * instrument.sigma), instrument.sigma)
+            curves.append(corner)
+            for id_, lengths, sparse in zip(
+                ("CR", "CO"), (corner.rounding, corner.overshoot), corner.sparse, strict=True
+            ):
                 mean = float(lengths.mean())
                 coarse = instrument.sigma > COARSE * mean and (id_ == "CR" or mean > 0.0)
-                coarse |= id_ == "CO" and here.noise > COARSE * mean > 0.0
+                coarse |= id_ == "CO" and corner.noise > COARSE * mean > 0.0
                 values.append(
                     Value(
                         id_,
                         "position",
-                        here.where,
+                        corner.where,
                         mean,
                         "length",
                         None,
@@ -177,13 +179,13 @@ def _cycle(
     first = int(behind.argmax()) if behind.any() else 0
     overshoot, noise = largest_top(time[first:], raw_aside[first:], outside[first:], sigma)
     highest = [span for span in spans_of(beyond > 0.0) if span[0] <= int(beyond.argmax()) <= span[1]]
-    kept = _kept(aside[along > _KEPT * reach[1]])
-    kept_before = _kept((away - np.outer(away @ before, before))[along < -_KEPT * reach[0]])
-    unsettled = np.flatnonzero(behind & (np.linalg.norm(aside - kept, axis=1) > band))
+    offset_after = _median_offset(aside[along > _STRAIGHT_SHARE * reach[1]])
+    offset_before = _median_offset((away - np.outer(away @ before, before))[along < -_STRAIGHT_SHARE * reach[0]])
+    unsettled = np.flatnonzero(behind & (np.linalg.norm(aside - offset_after, axis=1) > band))
     stabilisation = float(away[unsettled[-1]] @ after) if len(unsettled) else 0.0
     # where the two lines that the tip keeps come nearest to each other
     lines = np.concatenate([np.eye(3) - np.outer(before, before), np.eye(3) - np.outer(after, after)])
-    own = np.linalg.lstsq(lines, np.concatenate([kept_before, kept]), rcond=None)[0]
+    own = np.linalg.lstsq(lines, np.concatenate([offset_before, offset_after]), rcond=None)[0]
     steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
     nearest = int(_distance(position, corner).argmin())
     return _Turn(
@@ -200,7 +202,7 @@ def _cycle(
     )
 
 
-def _kept(aside: Array) -> Array:
+def _median_offset(aside: Array) -> Array:
     return np.asarray(np.median(aside, axis=0)) if len(aside) else np.zeros(3)
 
 

@@ -46,18 +46,18 @@ class DriftCourse:
     rp: Array
 
 
-def groups_of(one: Cycles) -> list[Cycles]:
+def groups_of(cycles: Cycles) -> list[Cycles]:
     """Return the groups of cycles in the order of time.
 
     A new one begins where the number of the cycle does not go on upwards, and after a pause of more than five times the
     usual time between two cycles.
     """
-    begins = one.cycle[1:] <= one.cycle[:-1]
-    between = np.diff(one.time)
+    begins = cycles.cycle[1:] <= cycles.cycle[:-1]
+    between = np.diff(cycles.time)
     if len(between) and np.isfinite(between).all():
         begins = begins | (between > _PAUSE * max(float(np.median(between)), 1e-9))
-    ends = [0, *(np.flatnonzero(begins) + 1).tolist(), len(one)]
-    return [one.rows(slice(a, b)) for a, b in pairwise(ends)]
+    ends = [0, *(np.flatnonzero(begins) + 1).tolist(), len(cycles)]
+    return [cycles.rows(slice(a, b)) for a, b in pairwise(ends)]
 
 
 def drift_values(
@@ -108,15 +108,15 @@ def drift_values(
     return values, courses
 
 
-def _course(one: Cycles, groups: list[Cycles]) -> DriftCourse:
+def _course(cycles: Cycles, groups: list[Cycles]) -> DriftCourse:
     return DriftCourse(
-        robot=one.robot,
-        pose=one.pose,
-        velocity=one.velocity,
-        load=one.load,
+        robot=cycles.robot,
+        pose=cycles.pose,
+        velocity=cycles.velocity,
+        load=cycles.load,
         time=np.array([group.time.mean() for group in groups]),
         cycles=tuple(map(len, groups)),
-        ap=np.array([float(np.linalg.norm(group.barycentre - one.command)) for group in groups]),
+        ap=np.array([float(np.linalg.norm(group.barycentre - cycles.command)) for group in groups]),
         rp=np.array([float(repeatability(group.points)) if len(group) > 1 else math.nan for group in groups]),
     )
 
@@ -180,9 +180,9 @@ def _scatter_of_accuracy(groups: list[Cycles], command: Array) -> _Scatter:
     covariance = _pooled([group.points for group in groups])
     away = np.mean([group.barycentre - command for group in groups], axis=0)
 
-    def drawn(which: int) -> Array:
+    def drawn(draw: int) -> Array:
         norms = [
-            np.linalg.norm(away + barycentre_scatter(covariance, len(group), None, 2 * k + which), axis=1)
+            np.linalg.norm(away + barycentre_scatter(covariance, len(group), None, 2 * k + draw), axis=1)
             for k, group in enumerate(groups)
         ]
         return np.stack([norm - norm.mean() for norm in norms], axis=1)
@@ -197,11 +197,11 @@ def _scatter_of_spread(groups: list[Array], spread: Array) -> _Scatter:
     about = np.concatenate([group - group.mean(axis=0) for group in groups])
     of_cycles = {cycles: repeatability_scatter(about, cycles) for cycles in {*map(len, groups)}}
 
-    def drawn(which: int) -> Array:
+    def drawn(draw: int) -> Array:
         columns = []
         for k, group in enumerate(groups):
             ratios = of_cycles[len(group)]
-            order = np.random.default_rng((9283, 2 * k + which)).permutation(len(ratios))
+            order = np.random.default_rng((9283, 2 * k + draw)).permutation(len(ratios))
             columns.append(spread.mean() * (ratios[order] - 1.0))
         return np.stack(columns, axis=1)
 
@@ -219,13 +219,13 @@ def _change_of_angle(id: str, groups: list[Array]) -> tuple[float, Interval | No
         pooled = _pooled([group[:, None] for group in groups])
         if id == "dAP":
             scatter = tuple(
-                np.concatenate([barycentre_scatter(pooled, m, None, 2 * k + which) for k, m in enumerate(n)], axis=1)
-                for which in (1, 2)
+                np.concatenate([barycentre_scatter(pooled, m, None, 2 * k + draw) for k, m in enumerate(n)], axis=1)
+                for draw in (1, 2)
             )
         elif pooled[0, 0] > 0:
             rng = np.random.default_rng(9283)
             chi = [np.sqrt(rng.chisquare(m - 1, (2, 2000)) / (m - 1)) - 1.0 for m in n]
             scatter = tuple(
-                3.0 * math.sqrt(pooled[0, 0]) * np.stack([one[which] for one in chi], 1) for which in (0, 1)
+                3.0 * math.sqrt(pooled[0, 0]) * np.stack([ratios[draw] for ratios in chi], 1) for draw in (0, 1)
             )
     return _largest_change(course, scatter)  # type: ignore[arg-type]

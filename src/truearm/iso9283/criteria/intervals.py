@@ -115,8 +115,8 @@ def repeatability_interval(points: Array) -> Interval | None:
     value, error = _log_of_distances(np.linalg.norm(centred, axis=1))
     if not math.exp(float(value)) > 0:
         return None
-    true, found, errors = _gaussian_campaigns(centred, n)
-    quotient = np.sort((found - true) / errors)
+    true, simulated, errors = _gaussian_campaigns(centred, n)
+    quotient = np.sort((simulated - true) / errors)
     low, high = np.quantile(quotient, (TAIL, 1.0 - TAIL))
     own = max(float(error), _LEAST_ERROR * float(np.median(errors)))
     return math.exp(float(value) - float(high) * own), math.exp(float(value) - float(low) * own)
@@ -129,8 +129,8 @@ def repeatability_scatter(points: Array, cycles: int) -> Array:
         points: About their barycentre, ``(n, 3)``.
         cycles: Of a group, 2 or more.
     """
-    true, found, _ = _gaussian_campaigns(points, cycles)
-    return np.asarray(np.exp(found - true))
+    true, simulated, _ = _gaussian_campaigns(points, cycles)
+    return np.asarray(np.exp(simulated - true))
 
 
 def _gaussian_campaigns(centred: Array, cycles: int) -> tuple[float, Array, Array]:
@@ -140,8 +140,8 @@ def _gaussian_campaigns(centred: Array, cycles: int) -> tuple[float, Array, Arra
     squares, many = _squares(cycles)
     length = np.sqrt(many @ variances)
     true = math.log(float(length.mean() + 3.0 * length.std()))
-    found, errors = _log_of_distances(np.sqrt(squares @ variances))
-    return true, found, errors
+    simulated, errors = _log_of_distances(np.sqrt(squares @ variances))
+    return true, simulated, errors
 
 
 @lru_cache(maxsize=8)
@@ -205,8 +205,8 @@ def norm_interval(mean: Array, covariance: Array, cycles: int, known: Array) -> 
     span = float(np.sqrt(squares.max()))
     tested = np.linspace(max(0.0, norm - span), norm + span, _TESTED)
     places = _likeliest(axes.T @ mean, np.maximum(variances, 1e-9 * variances[-1]), tested)
-    found = tested[:, None] ** 2 + 2.0 * places @ noise.T + squares
-    share_below = np.minimum.accumulate((found <= norm**2).mean(axis=1))
+    squared_norms = tested[:, None] ** 2 + 2.0 * places @ noise.T + squares
+    share_below = np.minimum.accumulate((squared_norms <= norm**2).mean(axis=1))
     at_zero = float(np.mean(squares <= norm**2))
     upper = float(np.interp(-TAIL * max(at_zero, 1.0 / _DRAWS), -share_below, tested))
     if at_zero <= 1.0 - TAIL:
@@ -242,7 +242,7 @@ def _likeliest(mean: Array, variances: Array, norms: Array) -> Array:
     return np.asarray(place * np.where(size > 0, norms / np.where(size > 0, size, 1.0), 0.0)[:, None])
 
 
-def largest_interval(statistic: Statistic, found: Array, noise: Array, other: Array) -> Interval | None:
+def largest_interval(statistic: Statistic, places: Array, noise: Array, other: Array) -> Interval | None:
     """Return the interval of a largest difference between places.
 
     For each value to be tested the true places differ by as much, with a shape that is drawn from what the measured
@@ -250,30 +250,30 @@ def largest_interval(statistic: Statistic, found: Array, noise: Array, other: Ar
 
     Args:
         statistic: Of places ``(m, ...)``, ``(m,)``: never negative, and k times as large for places k times as large.
-        found: The measured places, ``(...)``.
+        places: The measured places, ``(...)``.
         noise, other: Two drawings of how the places scatter, ``(m, ...)``.
 
     Returns:
         tuple or None: From zero where zero cannot be ruled out. None if nothing scatters.
     """
-    value = float(statistic(found[None])[0])
+    value = float(statistic(places[None])[0])
     scale = float(statistic(noise).max())
     if not scale > 0:
         return None
-    shapes = found[None] + other
-    shapes = shapes / statistic(shapes).reshape(-1, *(1,) * found.ndim)
+    shapes = places[None] + other
+    shapes = shapes / statistic(shapes).reshape(-1, *(1,) * places.ndim)
 
     def share_below(tested: float) -> float:
         return float(np.mean(statistic(tested * shapes + noise) <= value))
 
     at_zero = share_below(0.0)
-    upper = _where(share_below, TAIL * max(at_zero, 1.0 / _DRAWS), value, value + scale)
+    upper = _crossing(share_below, TAIL * max(at_zero, 1.0 / _DRAWS), value, value + scale)
     if at_zero <= 1.0 - _TAIL_BELOW:
         return 0.0, upper
-    return _where(share_below, 1.0 - _TAIL_BELOW, max(0.0, value - scale), value), upper
+    return _crossing(share_below, 1.0 - _TAIL_BELOW, max(0.0, value - scale), value), upper
 
 
-def _where(falling: Callable[[float], float], level: float, low: float, high: float) -> float:
+def _crossing(falling: Callable[[float], float], level: float, low: float, high: float) -> float:
     """Return where a function that falls comes down to a level."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
@@ -299,10 +299,10 @@ def barycentre_scatter(covariance: Array, cycles: int, known: Array | None, stre
     d = len(covariance)
     drawn, _ = _drawn(stream)
     scale = _scale(stream, cycles)
-    made = scale[:, None] * (drawn[:, :d] @ _root(covariance / cycles).T)
+    scatter = scale[:, None] * (drawn[:, :d] @ _root(covariance / cycles).T)
     if known is not None:
-        made = made + drawn[:, 3 : 3 + d] @ _root(known).T
-    return np.asarray(made)
+        scatter = scatter + drawn[:, 3 : 3 + d] @ _root(known).T
+    return np.asarray(scatter)
 
 
 @lru_cache(maxsize=256)
@@ -337,24 +337,24 @@ def largest_difference(places: Sequence[Array], pairs: Sequence[tuple[int, int]]
     Returns:
         tuple: The interval is None where a place has fewer than :data:`LEAST_CYCLES` cycles, or nothing scatters.
     """
-    one, other = np.array(pairs, dtype=np.intp).T
-    found = np.array([place.mean(axis=0) for place in places])
+    first, second = np.array(pairs, dtype=np.intp).T
+    barycentres = np.array([place.mean(axis=0) for place in places])
 
     def largest(simulated: Array) -> Array:
-        return np.asarray(np.linalg.norm(simulated[:, one] - simulated[:, other], axis=-1).max(axis=-1))
+        return np.asarray(np.linalg.norm(simulated[:, first] - simulated[:, second], axis=-1).max(axis=-1))
 
-    value = float(largest(found[None])[0])
+    value = float(largest(barycentres[None])[0])
     if min(map(len, places)) < LEAST_CYCLES:
         return value, None
     covariances = [np.atleast_2d(np.cov(place.T)) for place in places]
     noise, shapes = (
         np.stack(
             [
-                barycentre_scatter(covariance, len(place), None, 2 * k + which)
+                barycentre_scatter(covariance, len(place), None, 2 * k + draw)
                 for k, (covariance, place) in enumerate(zip(covariances, places, strict=True))
             ],
             axis=1,
         )
-        for which in (1, 2)
+        for draw in (1, 2)
     )
-    return value, largest_interval(largest, found - found.mean(axis=0), noise, shapes)
+    return value, largest_interval(largest, barycentres - barycentres.mean(axis=0), noise, shapes)

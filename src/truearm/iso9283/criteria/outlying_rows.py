@@ -58,7 +58,7 @@ def alike_cycles(cycles: Sequence[Cycles]) -> tuple[AlikeCycles, ...]:
     for cycle in cycles:
         if cycle.test != "dAP" and len(cycle) >= _LEAST_CYCLES:
             parts.setdefault((cycle.test, cycle.velocity, cycle.load), []).append(cycle)
-    found = []
+    candidates = []
     for key, groups in parts.items():
         vectors = _vectors(groups)
         if len(vectors) < _LEAST_CYCLES or not vectors.shape[1]:
@@ -66,13 +66,13 @@ def alike_cycles(cycles: Sequence[Cycles]) -> tuple[AlikeCycles, ...]:
         n = len(vectors)
         squares = float((vectors**2).sum())
         correlation = float((vectors[:-1] * vectors[1:]).sum()) / squares + 1.0 / n
-        found.append(AlikeCycles(*key, correlation, float(np.sqrt(_share(vectors) / n))))
-    if not found:
+        candidates.append(AlikeCycles(*key, correlation, float(np.sqrt(_share(vectors) / n))))
+    if not candidates:
         return ()
     from scipy.special import ndtri
 
-    far = float(ndtri(1.0 - _FALSE / len(found)))
-    return tuple(one for one in found if one.correlation > far * one.usual)
+    far = float(ndtri(1.0 - _FALSE / len(candidates)))
+    return tuple(candidate for candidate in candidates if candidate.correlation > far * candidate.usual)
 
 
 def _vectors(groups: Sequence[Cycles]) -> Array:
@@ -162,9 +162,9 @@ def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRow
     two: list[TwoPlaces] = []
     kinds: tuple[Kind, Kind] = ("position", "orientation")
     for kind, least in zip(kinds, instrument.least_scatter(_LEAST_SCATTER), strict=True):
-        mine = [group for group in groups if kind == "position" or group.angles is not None]
-        if mine:
-            rows = _Rows(mine, kind, least)
+        groups_read = [group for group in groups if kind == "position" or group.angles is not None]
+        if groups_read:
+            rows = _Rows(groups_read, kind, least)
             places = rows.two_places()
             named, alike = rows.outlying(places)
             outlying += named
@@ -174,9 +174,9 @@ def unusual_rows(cycles: Sequence[Cycles], instrument: Instrument) -> UnusualRow
 
 def without(cycles: Sequence[Cycles], outlying: Sequence[OutlyingRow]) -> list[Cycles]:
     """Return cycles without some rows."""
-    lines = np.array([int(one.of.line[0]) for one in outlying])
+    lines = np.array([int(row.of.line[0]) for row in outlying])
     left = [cycle.rows(~np.isin(cycle.line, lines)) for cycle in cycles]
-    return [one for one in left if len(one)]
+    return [group for group in left if len(group)]
 
 
 class _Rows:
@@ -198,22 +198,25 @@ class _Rows:
 
     def two_places(self) -> dict[int, TwoPlaces]:
         """Return the groups whose cycles are in two places, three cycles or more in each."""
-        found = {}
+        places_of_groups = {}
         for number, (group, begin, n) in enumerate(zip(self.groups, self.begin, self.counts, strict=True)):
             if n >= _LEAST_CYCLES_OUTLYING_ROWS:
                 split = _split(self.numbers[begin : begin + n], self.floor)
                 if split is not None:
                     apart, fewer = split
                     lines = tuple(sorted(group.line[fewer].tolist()))
-                    found[number] = TwoPlaces(group, self.kind, apart, (len(fewer), n - len(fewer)), lines)
-        return found
+                    places_of_groups[number] = TwoPlaces(group, self.kind, apart, (len(fewer), n - len(fewer)), lines)
+        return places_of_groups
 
     def outlying(self, places: dict[int, TwoPlaces]) -> tuple[list[OutlyingRow], list[TwoPlaces]]:
         """Return outlying rows that are in no second place of rest, and second places that are seen by them."""
         chosen = self._furthest()
         rows = np.array([row for row in np.flatnonzero(chosen) if self.group[row] not in places], dtype=np.intp)
         means, offset = self._means(chosen), self._offsets()
-        keys = [(one.test, one.robot, one.pose, one.approach, one.velocity, one.load) for one in self.groups]
+        keys = [
+            (cycles.test, cycles.robot, cycles.pose, cycles.approach, cycles.velocity, cycles.load)
+            for cycles in self.groups
+        ]
         named: list[OutlyingRow] = []
         alike: dict[tuple[object, ...], TwoPlaces] = {}
         for row in rows:
@@ -267,9 +270,9 @@ class _Rows:
 
     def _means(self, chosen: NDArray[np.bool_]) -> Array:
         """Return the mean of the rows of each group that are not chosen, ``(groups, 3)``."""
-        kept = (~chosen).astype(float)
-        n = np.bincount(self.group, kept, len(self.groups))
-        sums = [np.bincount(self.group, kept * self.numbers[:, k], len(self.groups)) for k in range(3)]
+        retained = (~chosen).astype(float)
+        n = np.bincount(self.group, retained, len(self.groups))
+        sums = [np.bincount(self.group, retained * self.numbers[:, k], len(self.groups)) for k in range(3)]
         return np.asarray(np.stack(sums, axis=1) / np.maximum(n, 1.0)[:, None])
 
     def _deviations(self, chosen: NDArray[np.bool_]) -> Array:
@@ -278,18 +281,20 @@ class _Rows:
         The scatter is that of the others, without the row itself; 0 where they are too few to say it.
         """
         group, groups = self.group, len(self.groups)
-        kept = (~chosen).astype(float)
-        n = np.bincount(group, kept, groups)
+        retained = (~chosen).astype(float)
+        n = np.bincount(group, retained, groups)
         squares = ((self.numbers - self._means(chosen)[group]) ** 2).sum(axis=1)
         # From the mean without the row: the sum of squares falls by as much where the row is left out.
         squares *= np.where(chosen, n[group] / (n[group] + 1.0), n[group] / np.maximum(n[group] - 1.0, 1e-9))
-        about = np.bincount(group, kept * squares * np.maximum(n - 1.0, 0.0)[group] / np.maximum(n, 1.0)[group], groups)
+        about = np.bincount(
+            group, retained * squares * np.maximum(n - 1.0, 0.0)[group] / np.maximum(n, 1.0)[group], groups
+        )
         freedom = np.maximum(n - 1.0, 0.0)
         for family in np.unique(self.family[self.small]):
             those = self.small & (self.family == family)
             about[those], freedom[those] = about[those].sum(), freedom[those].sum()
-        left = np.maximum(about[group] - kept * squares, 0.0)
-        free = freedom[group] - kept
+        left = np.maximum(about[group] - retained * squares, 0.0)
+        free = freedom[group] - retained
         variance = np.maximum(left / np.maximum(free, 1.0), self.floor**2)
         deviations = np.sqrt(squares / variance) / _gaussian_deviation(free)
         deviations = np.where(self.small[group], deviations / _CAUTION, deviations)
@@ -300,8 +305,8 @@ def _gaussian_deviation(freedom: Array) -> Array:
     """Return how many times further Student's t reaches than a Gaussian, ``(n,)``."""
     from scipy.special import ndtri, stdtrit
 
-    each, which = np.unique(np.maximum(freedom, 1.0), return_inverse=True)
-    return np.asarray(stdtrit(each, 1.0 - _RARE) / ndtri(1.0 - _RARE))[which]
+    each, inverse = np.unique(np.maximum(freedom, 1.0), return_inverse=True)
+    return np.asarray(stdtrit(each, 1.0 - _RARE) / ndtri(1.0 - _RARE))[inverse]
 
 
 def _split(points: Array, floor: float) -> tuple[float, NDArray[np.intp]] | None:

@@ -106,11 +106,11 @@ def path_values(
                 cure="Measure with an instrument that reads orientations, or leave the test out.",
             )
         rng = np.random.default_rng(seed)
-        here = deviations_of(run)
-        of_paths.append(here)
-        values += _position_values(here, suffix, instrument, tie, rng)
-        if here.angles is not None:
-            values += _angle_values(here, suffix, instrument, tie_rot, rng)
+        course = deviations_of(run)
+        of_paths.append(course)
+        values += _position_values(course, suffix, instrument, tie, rng)
+        if course.angles is not None:
+            values += _angle_values(course, suffix, instrument, tie_rot, rng)
     return values, of_paths
 
 
@@ -142,27 +142,27 @@ def deviations_of(run: Run, stations: int = STATIONS) -> PathDeviations:
     )
 
 
-def outlying_cycle(here: PathDeviations) -> tuple[int, float, float, float] | None:
+def outlying_cycle(course: PathDeviations) -> tuple[int, float, float, float] | None:
     """Return a cycle that is elsewhere as a whole: which, how far [m], and AT and RT without it; None if none is.
 
     It is four times as far from the middle of the cycles as every other one, root mean square over the stations; of
     five to seven cycles twelve times. Fewer do not tell.
     """
-    n = len(here.deviation)
+    n = len(course.deviation)
     if n < LEAST_CYCLES:
         return None
-    away = here.deviation - np.median(here.deviation, axis=0)
+    away = course.deviation - np.median(course.deviation, axis=0)
     far = np.sqrt((away**2).sum(axis=2).mean(axis=1))
     order = np.argsort(far)
     worst = int(order[-1])
     if far[worst] <= (_OUTLYING if n >= _FEW else _OUTLYING_OF_FEW) * far[order[-2]]:
         return None
-    rest = np.delete(here.deviation, worst, axis=0)
+    others = np.delete(course.deviation, worst, axis=0)
     return (
         worst,
         float(far[worst]),
-        float(np.linalg.norm(rest.mean(axis=0), axis=1).max()),
-        float(_spread(rest).max()),
+        float(np.linalg.norm(others.mean(axis=0), axis=1).max()),
+        float(_spread(others).max()),
     )
 
 
@@ -195,70 +195,70 @@ def _intersections(cycle: Cycle, run: Run, along: Array, half: float) -> tuple[A
     if cycle.rotation is not None:
         turned = rotation_vector(cycle.rotation[order] @ np.swapaxes(run.path.rotations(s), 1, 2))
         columns = np.concatenate([away, turned], axis=1)
-    found, _, count = local_lines(s, columns, along, half)
-    return found[:, :3], found[:, 3:] if cycle.rotation is not None else None, np.maximum(count, 1.0)
+    intersections, _, count = local_lines(s, columns, along, half)
+    return intersections[:, :3], intersections[:, 3:] if cycle.rotation is not None else None, np.maximum(count, 1.0)
 
 
 def _position_values(
-    here: PathDeviations, suffix: str, instrument: Instrument, tie: Array | None, rng: np.random.Generator
+    course: PathDeviations, suffix: str, instrument: Instrument, tie: Array | None, rng: np.random.Generator
 ) -> list[Value]:
-    run = here.run
-    n = len(here.deviation)
-    accuracy = float(here.distance.max())
-    sigma = instrument.sigma / np.sqrt(here.pooled)
+    run = course.run
+    n = len(course.deviation)
+    accuracy = float(course.distance.max())
+    sigma = instrument.sigma / np.sqrt(course.pooled)
     known = 0.0 if tie is None else float(np.linalg.norm(tie) / np.sqrt(3.0))
     values = [
         Value(
             f"AT{suffix}",
             "position",
-            here.path,
+            course.path,
             accuracy,
             "length",
-            _accuracy_interval(here.deviation, tie, rng) if n >= LEAST_CYCLES else None,
+            _accuracy_interval(course.deviation, tie, rng) if n >= LEAST_CYCLES else None,
             n,
             run.conditions,
-            run.status(coarse=here.sparse or np.hypot(sigma / np.sqrt(n), known) > COARSE * accuracy),
+            run.status(coarse=course.sparse or np.hypot(sigma / np.sqrt(n), known) > COARSE * accuracy),
         )
     ]
-    repeatability = float(here.spread.max())
+    repeatability = float(course.spread.max())
     values.append(
         Value(
             f"RT{suffix}",
             "position",
-            here.path,
+            course.path,
             repeatability,
             "length",
-            _repeatability_interval(here.deviation, repeatability, rng, factor=None) if n >= LEAST_CYCLES else None,
+            _repeatability_interval(course.deviation, repeatability, rng, factor=None) if n >= LEAST_CYCLES else None,
             n,
             run.conditions,
-            run.status(coarse=here.sparse or sigma > COARSE * repeatability) if n > 1 else "not-measured",
+            run.status(coarse=course.sparse or sigma > COARSE * repeatability) if n > 1 else "not-measured",
         )
     )
     return values
 
 
 def _angle_values(
-    here: PathDeviations, suffix: str, instrument: Instrument, tie_rot: float, rng: np.random.Generator
+    course: PathDeviations, suffix: str, instrument: Instrument, tie_rot: float, rng: np.random.Generator
 ) -> list[Value]:
-    run = here.run
+    run = course.run
     values = []
-    assert here.angles is not None
-    sigma = (instrument.sigma_rot or 0.0) / np.sqrt(here.pooled)
+    assert course.angles is not None
+    sigma = (instrument.sigma_rot or 0.0) / np.sqrt(course.pooled)
     for axis, component in enumerate(_ANGLES):
-        angle = here.angles[:, :, axis : axis + 1]
+        angle = course.angles[:, :, axis : axis + 1]
         n = len(angle)
         accuracy = float(np.abs(angle.mean(axis=0)).max())
         values.append(
             Value(
                 f"AT{suffix}",
                 component,
-                here.path,
+                course.path,
                 accuracy,
                 "angle",
                 _accuracy_interval(angle, np.array([tie_rot]) if tie_rot else None, rng) if n >= LEAST_CYCLES else None,
                 n,
                 run.conditions,
-                run.status(coarse=here.sparse or np.hypot(sigma / np.sqrt(n), tie_rot) > COARSE * accuracy),
+                run.status(coarse=course.sparse or np.hypot(sigma / np.sqrt(n), tie_rot) > COARSE * accuracy),
             )
         )
         spread = 3 * float(angle.std(axis=0, ddof=1).max()) if n > 1 else np.nan
@@ -266,13 +266,13 @@ def _angle_values(
             Value(
                 f"RT{suffix}",
                 component,
-                here.path,
+                course.path,
                 spread,
                 "angle",
                 _repeatability_interval(angle, spread, rng, factor=3.0) if n >= LEAST_CYCLES else None,
                 n,
                 run.conditions,
-                run.status(coarse=here.sparse or sigma > COARSE * spread) if n > 1 else "not-measured",
+                run.status(coarse=course.sparse or sigma > COARSE * spread) if n > 1 else "not-measured",
             )
         )
     return values

@@ -53,28 +53,28 @@ ROBOTS: Final = 5
 
 def missing_rows(plan: PerformancePlan, cycles: Sequence[Cycles]) -> tuple[str, ...]:
     """Return what is missing in tests of poses that have rows: ``AP: P3``, ``vAP: P2 from y``, ``AP: P3 at 50 %``."""
-    found = []
+    missing = []
     for test in plan.tests:
-        mine = [cycle for cycle in cycles if cycle.test == test.id]
-        if mine:
-            robots = sorted({one.robot for one in mine})
-            found += [line for robot in robots for line in _missing_of(test, mine, robot, len(robots) > 1)]
+        of_test = [cycle for cycle in cycles if cycle.test == test.id]
+        if of_test:
+            robots = sorted({cycle.robot for cycle in of_test})
+            missing += [line for robot in robots for line in _missing_of(test, of_test, robot, len(robots) > 1)]
             if test.id == "E" and len(robots) < ROBOTS:
-                found.append(f"E: {ROBOTS - len(robots)} of {ROBOTS} robots")
-    return tuple(found)
+                missing.append(f"E: {ROBOTS - len(robots)} of {ROBOTS} robots")
+    return tuple(missing)
 
 
 def _missing_of(test: PlannedTest, cycles: Sequence[Cycles], robot: str, several: bool) -> list[str]:
-    there = {(cycle.pose, cycle.approach, cycle.velocity, cycle.load) for cycle in cycles if cycle.robot == robot}
+    measured = {(cycle.pose, cycle.approach, cycle.velocity, cycle.load) for cycle in cycles if cycle.robot == robot}
     of = f" of {robot}" if several else ""
     approaches = test.approaches if test.id == "vAP" else ("",)
     conditions = [*product(test.velocities, test.loads)]
-    found = []
+    missing = []
     for pose, approach in product(test.places, approaches):
-        absent = [under for under in conditions if (pose, approach, *under) not in there]
-        where = f"{test.id}: {pose}{f' from {approach}' if approach else ''}"
-        found += [f"{where}{of}{under}" for under in _at(absent, conditions, test)]
-    return found
+        absent = [under for under in conditions if (pose, approach, *under) not in measured]
+        label = f"{test.id}: {pose}{f' from {approach}' if approach else ''}"
+        missing += [f"{label}{of}{under}" for under in _at(absent, conditions, test)]
+    return missing
 
 
 def _at(absent: Sequence[tuple[float, float]], all_: Sequence[tuple[float, float]], test: PlannedTest) -> list[str]:
@@ -99,33 +99,36 @@ class MissingPlace:
 
 def missing_places(plan: PerformancePlan, values: Sequence[Value]) -> tuple[MissingPlace, ...]:
     """Return what is missing in tests of paths, of settling and of forces that have values."""
-    found = []
+    missing = []
     for test in plan.tests:
-        mine = [v for v in values if TEST_OF[v.id] == test.id and math.isfinite(v.value)]
-        if TESTS[test.id].readings == "poses" or not mine:
+        of_test = [v for v in values if TEST_OF[v.id] == test.id and math.isfinite(v.value)]
+        if TESTS[test.id].readings == "poses" or not of_test:
             continue
         conditions = [*product(test.velocities, test.loads)]
         for place in test.approaches or test.places:
-            here = [v.conditions for v in mine if _is_at(v.where, place)]
-            absent = [under for under in conditions if not any(_is_under(one, under) for one in here)]
-            where = f"{test.places[0]}-{place}" if test.id == "posing-time" else place
+            measured = [v.conditions for v in of_test if _is_at(v.where, place)]
+            absent = [under for under in conditions if not any(_is_under(attained, under) for attained in measured)]
+            value_place = f"{test.places[0]}-{place}" if test.id == "posing-time" else place
             for under, words in zip(absent, _at(absent, conditions, test), strict=False):
-                known = mine[0].conditions
+                known = of_test[0].conditions
                 velocity = None if known.velocity is None else under[0]
                 load = None if known.load is None else under[1]
-                found.append(MissingPlace(test.id, where, Conditions(velocity, load), f"{test.id}: {where}{words}"))
-    return tuple(found)
+                missing.append(
+                    MissingPlace(test.id, value_place, Conditions(velocity, load), f"{test.id}: {value_place}{words}")
+                )
+    return tuple(missing)
 
 
-def _is_at(where: str, place: str) -> bool:
+def _is_at(value_place: str, place: str) -> bool:
     """Return whether a value is of a place: ``rectangle E2`` of the rectangle, ``P1-D10`` of D10."""
-    return where == place or where.startswith(f"{place} ") or where.endswith(f"-{place}")
+    return value_place == place or value_place.startswith(f"{place} ") or value_place.endswith(f"-{place}")
 
 
-def _is_under(one: Conditions, under: tuple[float, float]) -> bool:
+def _is_under(conditions: Conditions, under: tuple[float, float]) -> bool:
     """Return whether a value is of a velocity and a load, which are not said where they do not matter."""
     return all(
-        own is None or abs(own - planned) < 1e-6 for own, planned in zip((one.velocity, one.load), under, strict=True)
+        own is None or abs(own - planned) < 1e-6
+        for own, planned in zip((conditions.velocity, conditions.load), under, strict=True)
     )
 
 
@@ -175,7 +178,7 @@ class _Judge:
         return self.instrument.sigma_rot or 0.0
 
 
-_Made = Iterator[Value]
+_Values = Iterator[Value]
 
 
 def evaluate(
@@ -191,11 +194,11 @@ def evaluate(
     values, courses = _evaluated(plan.tests, cycles, judge)
     unusual = unusual_rows(cycles, instrument)
     if unusual.outlying:
-        tests = {one.of.test for one in unusual.outlying}
+        tests = {row.of.test for row in unusual.outlying}
         left = without(cycles, unusual.outlying)
         others, _ = _evaluated([test for test in plan.tests if test.id in tests], left, judge)
         unusual = replace(
-            unusual, outlying=tuple(replace(one, changes=_changes(one, values, others)) for one in unusual.outlying)
+            unusual, outlying=tuple(replace(row, changes=_changes(row, values, others)) for row in unusual.outlying)
         )
     clouds = tuple(_cloud(cycle) for cycle in cycles if cycle.test != "dAP")
     return PoseEvaluation(tuple(values), clouds, tuple(courses), unusual, missing_rows(plan, cycles))
@@ -207,13 +210,13 @@ def _evaluated(
     values: list[Value] = []
     courses: list[DriftCourse] = []
     for test in tests:
-        mine = [cycle for cycle in cycles if cycle.test == test.id]
+        of_test = [cycle for cycle in cycles if cycle.test == test.id]
         if test.id == "dAP":
-            made, found = drift_values(test, mine, judge.instrument, judge.alignment)
-            values += made
-            courses += found
+            test_values, test_courses = drift_values(test, of_test, judge.instrument, judge.alignment)
+            values += test_values
+            courses += test_courses
         elif test.id in _EVALUATED:
-            values += _EVALUATED[test.id](test, mine, judge)
+            values += _EVALUATED[test.id](test, of_test, judge)
     return values, courses
 
 
@@ -222,7 +225,7 @@ def _changes(row: OutlyingRow, values: Sequence[Value], others: Sequence[Value])
     of = row.of
     under = Conditions(of.velocity, of.load, "" if of.test == "E" else of.robot)
     parts = ("position",) if row.kind == "position" else ANGLES
-    mine = [
+    affected = [
         value
         for value in values
         if value.id in TESTS[of.test].criteria
@@ -232,15 +235,24 @@ def _changes(row: OutlyingRow, values: Sequence[Value], others: Sequence[Value])
         and math.isfinite(value.value)
     ]
     key = {(v.id, v.component, v.where, v.conditions): v for v in others}
-    pairs = [(v, key.get((v.id, v.component, v.where, v.conditions))) for v in mine]
-    found = [(one, other) for one, other in pairs if other is not None]
-    return tuple(sorted(found, key=lambda pair: -abs(pair[0].value - pair[1].value)))
+    pairs = [(v, key.get((v.id, v.component, v.where, v.conditions))) for v in affected]
+    changes = [(with_row, without_row) for with_row, without_row in pairs if without_row is not None]
+    return tuple(sorted(changes, key=lambda pair: -abs(pair[0].value - pair[1].value)))
 
 
-def _cloud(one: Cycles) -> PoseCloud:
-    rp = float(repeatability(one.points)) if len(one) > 1 else _NOTHING
+def _cloud(group: Cycles) -> PoseCloud:
+    rp = float(repeatability(group.points)) if len(group) > 1 else _NOTHING
     return PoseCloud(
-        one.test, one.robot, one.pose, one.approach, one.velocity, one.load, one.command, one.points, one.barycentre, rp
+        group.test,
+        group.robot,
+        group.pose,
+        group.approach,
+        group.velocity,
+        group.load,
+        group.command,
+        group.points,
+        group.barycentre,
+        rp,
     )
 
 
@@ -250,9 +262,9 @@ def _conditions(test: PlannedTest, cycles: list[Cycles], *, robots: bool = True)
     return [Conditions(v, load, name) for name in names or [""] for v in test.velocities for load in test.loads]
 
 
-def _same(one: Conditions, other: Conditions) -> bool:
-    pairs = ((one.velocity, other.velocity), (one.load, other.load))
-    return one.robot == other.robot and all(abs((a or 0.0) - (b or 0.0)) < 1e-9 for a, b in pairs)
+def _same(conditions: Conditions, other: Conditions) -> bool:
+    pairs = ((conditions.velocity, other.velocity), (conditions.load, other.load))
+    return conditions.robot == other.robot and all(abs((a or 0.0) - (b or 0.0)) < 1e-9 for a, b in pairs)
 
 
 def _at_poses(cycles: Iterable[Cycles], under: Conditions, pose: str, *, any_robot: bool = False) -> list[Cycles]:
@@ -264,7 +276,7 @@ def _at_poses(cycles: Iterable[Cycles], under: Conditions, pose: str, *, any_rob
     ]
 
 
-def _pose_accuracy(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
+def _pose_accuracy(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Values:
     """Yield AP, the distance of the barycentre from the command, and RP, ``mean l + 3 S_l`` with n - 1.
 
     Of angles: mean angle minus commanded angle, with its sign, and ``3 S``.
@@ -279,22 +291,22 @@ def _pose_accuracy(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _M
                     yield valued(id, "position", *common, _NOTHING, "length")
                     yield from (valued(id, angle, *common, _NOTHING, "angle") for angle in ANGLES)
                 continue
-            one = of_pose[0]
-            yield _accuracy(one, common, judge)
-            interval = repeatability_interval(one.points)
-            rp = float(repeatability(one.points)) if n > 1 else _NOTHING
-            yield from _angles_of(one, "AP", common, judge, judge.alignment.sigma_rot)
+            group = of_pose[0]
+            yield _accuracy(group, common, judge)
+            interval = repeatability_interval(group.points)
+            rp = float(repeatability(group.points)) if n > 1 else _NOTHING
+            yield from _angles_of(group, "AP", common, judge, judge.alignment.sigma_rot)
             yield valued("RP", "position", *common, rp, "length", interval, judge.sigma)
-            yield from _spreads_of(one.angles, "RP", common, judge.sigma_rot)
+            yield from _spreads_of(group.angles, "RP", common, judge.sigma_rot)
 
 
 _Common = tuple[str, int, int, Conditions]
 
 
-def _accuracy(one: Cycles, common: _Common, judge: _Judge) -> Value:
-    n = len(one)
-    away = one.points - one.command
-    known = judge.alignment.covariance_at(one.barycentre)
+def _accuracy(group: Cycles, common: _Common, judge: _Judge) -> Value:
+    n = len(group)
+    away = group.points - group.command
+    known = judge.alignment.covariance_at(group.barycentre)
     interval = None
     if n >= LEAST_CYCLES:
         interval = norm_interval(away.mean(axis=0), np.cov(away.T), n, known)
@@ -313,18 +325,18 @@ def _accuracy(one: Cycles, common: _Common, judge: _Judge) -> Value:
     )
 
 
-def _angles_of(one: Cycles, id: str, common: _Common, judge: _Judge, tie: float) -> _Made:
+def _angles_of(group: Cycles, id: str, common: _Common, judge: _Judge, tie: float) -> _Values:
     """Yield the mean angles."""
     for k, angle in enumerate(ANGLES):
-        if one.angles is None:
+        if group.angles is None:
             yield valued(id, angle, *common, _NOTHING, "angle")
             continue
-        mine = one.angles[:, k]
+        angles = group.angles[:, k]
         unknown = math.hypot(judge.sigma_rot, tie)
-        yield valued(id, angle, *common, float(mine.mean()), "angle", mean_interval(mine, tie**2), unknown)
+        yield valued(id, angle, *common, float(angles.mean()), "angle", mean_interval(angles, tie**2), unknown)
 
 
-def _spreads_of(angles: Array | None, id: str, common: _Common, unknown: float) -> _Made:
+def _spreads_of(angles: Array | None, id: str, common: _Common, unknown: float) -> _Values:
     """Yield ``3 S`` of angles."""
     for k, angle in enumerate(ANGLES):
         spread, interval = (_NOTHING, None) if angles is None else _spread(angles[:, k])
@@ -338,38 +350,40 @@ def _spread(numbers: Array) -> tuple[float, Interval | None]:
     return 3.0 * deviation, spread_interval(deviation, len(numbers))
 
 
-def _variation(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
+def _variation(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Values:
     """Yield vAP, the largest distance between the barycentres of the approaches, and the largest angle between them."""
     for under in _conditions(test, cycles):
         for pose in test.places:
             of_pose = _at_poses(cycles, under, pose)
-            n = min((len(one) for one in of_pose), default=0)
+            n = min((len(group) for group in of_pose), default=0)
             enough = len(of_pose) >= len(test.approaches)
             yield from _differences("vAP", of_pose, (pose, n, test.cycles, under), judge, enough=enough, angles=True)
 
 
-def _differences(id: str, found: list[Cycles], common: _Common, judge: _Judge, *, enough: bool, angles: bool) -> _Made:
+def _differences(
+    id: str, groups: list[Cycles], common: _Common, judge: _Judge, *, enough: bool, angles: bool
+) -> _Values:
     """Yield the largest distance between barycentres at the same pose, and the largest difference of each angle."""
-    pairs = [(i, j) for i in range(len(found)) for j in range(i) if found[i].pose == found[j].pose]
+    pairs = [(i, j) for i in range(len(groups)) for j in range(i) if groups[i].pose == groups[j].pose]
     nothing: tuple[float, Interval | None] = (_NOTHING, None)
-    value, interval = largest_difference([one.points for one in found], pairs) if pairs else nothing
+    value, interval = largest_difference([group.points for group in groups], pairs) if pairs else nothing
     unknown = math.sqrt(2.0) * judge.sigma
     yield valued(id, "position", *common, value, "length", interval, unknown, enough=enough)
     for k, angle in enumerate(ANGLES if angles else ()):
-        read = [one.angles[:, k : k + 1] for one in found if one.angles is not None]
-        value, interval = largest_difference(read, pairs) if pairs and len(read) == len(found) else nothing
+        read = [group.angles[:, k : k + 1] for group in groups if group.angles is not None]
+        value, interval = largest_difference(read, pairs) if pairs and len(read) == len(groups) else nothing
         unknown = math.sqrt(2.0) * judge.sigma_rot
         yield valued(id, angle, *common, value, "angle", interval, unknown, enough=enough)
 
 
-def _distances(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
+def _distances(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Values:
     """Yield AD, the mean distance of two poses minus the commanded one, and RD, ``3 S`` of the distances.
 
     Each cycle gives one distance. Along an axis, distances count as positive the way that is commanded; of an angle,
     the change of the error from the first pose to the second.
     """
     first, second = test.places[0], test.places[-1]
-    where = f"{first}-{second}"
+    pair = f"{first}-{second}"
     for under in _conditions(test, cycles):
         ends = [_at_poses(cycles, under, pose) for pose in (first, second)]
         both: tuple[Cycles, ...] = ()
@@ -378,7 +392,7 @@ def _distances(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
             both = (ends[0][0], ends[1][0])
             _, *rows = np.intersect1d(both[0].cycle, both[1].cycle, return_indices=True)  # type: ignore[assignment]
         n = len(rows[0])
-        common = (where, n, test.cycles, under)
+        common = (pair, n, test.cycles, under)
         if n == 0:
             for id in ("AD", "RD"):
                 yield from (valued(id, part, *common, _NOTHING, "length") for part in _LENGTHS)
@@ -410,7 +424,7 @@ def _distances(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
         yield from _spreads_of(turned, "RD", common, unknown_angle)
 
 
-def _exchangeability(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Made:
+def _exchangeability(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> _Values:
     """Yield E, the largest distance between the barycentres of robots at each pose, and the largest of all poses.
 
     The instrument stands still while robots are exchanged, so that its tie to the base is common to all. Fewer than
@@ -421,15 +435,15 @@ def _exchangeability(test: PlannedTest, cycles: list[Cycles], judge: _Judge) -> 
         for pose in test.places:
             of_pose = _at_poses(cycles, under, pose, any_robot=True)
             whole += of_pose
-            n = min((len(one) for one in of_pose), default=0)
+            n = min((len(group) for group in of_pose), default=0)
             enough = len(of_pose) >= ROBOTS
             yield from _differences("E", of_pose, (pose, n, test.cycles, under), judge, enough=enough, angles=False)
-        n = min((len(one) for one in whole), default=0)
+        n = min((len(group) for group in whole), default=0)
         enough = len(whole) >= ROBOTS * len(test.places)
         yield from _differences("E", whole, ("all poses", n, test.cycles, under), judge, enough=enough, angles=False)
 
 
-_EVALUATED: Final[dict[str, Callable[[PlannedTest, list[Cycles], _Judge], _Made]]] = {
+_EVALUATED: Final[dict[str, Callable[[PlannedTest, list[Cycles], _Judge], _Values]]] = {
     "AP": _pose_accuracy,
     "vAP": _variation,
     "AD": _distances,

@@ -74,9 +74,9 @@ class Instrument:
         Args:
             resolution, resolution_rot: Steps to which positions [m] and components of quaternions were rounded.
         """
-        one, other = resolution / math.sqrt(12.0), 2.0 * resolution_rot / math.sqrt(12.0)
-        turned = self.sigma_rot if self.sigma_rot is None else max(self.sigma_rot, other)
-        return Instrument(max(self.sigma, one), turned, one, other)
+        rounding, rounding_rot = resolution / math.sqrt(12.0), 2.0 * resolution_rot / math.sqrt(12.0)
+        turned = self.sigma_rot if self.sigma_rot is None else max(self.sigma_rot, rounding_rot)
+        return Instrument(max(self.sigma, rounding), turned, rounding, rounding_rot)
 
     def least_scatter(self, share: float) -> tuple[float, float]:
         """Return below what no scatter of coordinates [m] and angles [rad] is taken: a share of sigma, or rounding."""
@@ -94,7 +94,7 @@ ANGLES: Final[tuple[Literal["a", "b", "c"], ...]] = ("a", "b", "c")
 def valued(
     id: str,
     component: Component,
-    where: str,
+    place: str,
     cycles: int,
     planned: int,
     conditions: Conditions,
@@ -124,7 +124,7 @@ def valued(
         status = "instrument-too-coarse"
     else:
         status = "measured"
-    return Value(id, component, where, value, quantity, interval, cycles, conditions, status, least, largest)
+    return Value(id, component, place, value, quantity, interval, cycles, conditions, status, least, largest)
 
 
 # Readings that are those of another cycle to the last digit: copied, or held by the instrument.
@@ -169,7 +169,7 @@ def refuse_copied_poses(readings: AttainedPoses) -> None:
         return
     usual = _middle(np.array(scatters))
     step = _resolution(readings.position)
-    found: list[tuple[int, int]] = []
+    copies: list[tuple[int, int]] = []
     for rows in groups:
         pairs = _equal(readings.position[rows])
         if not pairs:
@@ -180,15 +180,15 @@ def refuse_copied_poses(readings: AttainedPoses) -> None:
             continue
         chance = float(np.prod(np.minimum(_DENSITY * step / scatter, 1.0))) * len(rows) * (len(rows) - 1) / 2
         if chance < _BY_CHANCE:
-            found += [(int(rows[one]), int(rows[other])) for one, other in pairs]
-    if not found:
+            copies += [(int(rows[i]), int(rows[j])) for i, j in pairs]
+    if not copies:
         return
-    one, other = min(found, key=lambda pair: pair[1])
+    first, second = min(copies, key=lambda pair: pair[1])
     raise InputError(
-        f"{len(found)} row{'s' * (len(found) != 1)} with the position of another cycle of the same pose, to the last "
+        f"{len(copies)} row{'s' * (len(copies) != 1)} with the position of another cycle of the same pose, to the last "
         "digit",
-        where=f"{readings.source}, lines {int(readings.line[one])} and {int(readings.line[other])}",
-        came=f"cycles {int(readings.cycle[one])} and {int(readings.cycle[other])} of {_name(readings.pose, one)}",
+        where=f"{readings.source}, lines {int(readings.line[first])} and {int(readings.line[second])}",
+        came=f"cycles {int(readings.cycle[first])} and {int(readings.cycle[second])} of {_name(readings.pose, first)}",
         allowed="readings that scatter as those of the other cycles",
         cure="A row was copied, or the instrument held its value: write what was read, or remove the cycle.",
     )
@@ -196,25 +196,25 @@ def refuse_copied_poses(readings: AttainedPoses) -> None:
 
 def copied_blocks(samples: Samples) -> tuple[CopiedBlock, ...]:
     """Return samples of a cycle that another one of the same place has too, one block for each two cycles."""
-    found: dict[tuple[str, str, int, int], CopiedBlock] = {}
+    blocks: dict[tuple[str, str, int, int], CopiedBlock] = {}
     place = np.unique(np.column_stack([samples.criterion.code, samples.place.code]), axis=0, return_inverse=True)[1]
     place = place.reshape(-1)
     bits = np.ascontiguousarray(samples.position).view(np.uint64)
     with np.errstate(over="ignore"):
         mixed = (bits * np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)).sum(axis=1)
-    for which in range(int(place.max(initial=-1)) + 1):
-        rows = np.flatnonzero(place == which)
+    for code in range(int(place.max(initial=-1)) + 1):
+        rows = np.flatnonzero(place == code)
         for first, second, count in _blocks(mixed[rows], samples.cycle[rows]):
-            one, other = int(rows[first]), int(rows[second])
-            if not (samples.position[one] == samples.position[other]).all():
+            row, other = int(rows[first]), int(rows[second])
+            if not (samples.position[row] == samples.position[other]).all():
                 continue
-            cycles = int(samples.cycle[one]), int(samples.cycle[other])
-            test, name = _name(samples.criterion, one), _name(samples.place, one)
-            block = CopiedBlock(test, name, cycles, (int(samples.line[one]), int(samples.line[other])), count)
-            known = found.get((test, name, *cycles))
+            cycles = int(samples.cycle[row]), int(samples.cycle[other])
+            test, name = _name(samples.criterion, row), _name(samples.place, row)
+            block = CopiedBlock(test, name, cycles, (int(samples.line[row]), int(samples.line[other])), count)
+            known = blocks.get((test, name, *cycles))
             if known is None or known.count < count:
-                found[test, name, *cycles] = block
-    return tuple(found.values())
+                blocks[test, name, *cycles] = block
+    return tuple(blocks.values())
 
 
 def _blocks(mixed: NDArray[np.uint64], cycle: NDArray[np.intp]) -> list[tuple[int, int, int]]:
@@ -232,8 +232,8 @@ def _blocks(mixed: NDArray[np.uint64], cycle: NDArray[np.intp]) -> list[tuple[in
 
 def _equal(position: Array) -> list[tuple[int, int]]:
     """Return rows that equal another one, each with the first of them."""
-    _, first, which = np.unique(position, axis=0, return_index=True, return_inverse=True)
-    of = first[which.reshape(-1)]
+    _, first, inverse = np.unique(position, axis=0, return_index=True, return_inverse=True)
+    of = first[inverse.reshape(-1)]
     return [(int(of[row]), row) for row in range(len(position)) if of[row] != row]
 
 
@@ -266,11 +266,11 @@ def drift_order(readings: AttainedPoses, rows: NDArray[np.intp]) -> NDArray[np.i
             the times.
     """
     time = readings.time[rows]
-    given = np.isfinite(time)
-    if not given.any():
+    timed = np.isfinite(time)
+    if not timed.any():
         return np.arange(len(rows))
-    if not given.all():
-        missing = rows[~given]
+    if not timed.all():
+        missing = rows[~timed]
         raise InputError(
             f"{len(missing)} row{'s' * (len(missing) != 1)} of drift without a time beside rows with one",
             where=f"{readings.source}, line {int(readings.line[missing[0]])}, column time",
@@ -293,10 +293,10 @@ def drift_order(readings: AttainedPoses, rows: NDArray[np.intp]) -> NDArray[np.i
     down = np.flatnonzero(cycle[1:] <= cycle[:-1])
     most = int(np.unique(cycle, return_counts=True)[1].max())
     if len(down) + 1 > most:
-        one, other = (int(readings.line[rows[order[down[-1] + k]]]) for k in (0, 1))
+        line, other_line = (int(readings.line[rows[order[down[-1] + k]]]) for k in (0, 1))
         raise InputError(
             "the times of drift contradict the numbers of its cycles",
-            where=f"{readings.source}, lines {one} and {other}",
+            where=f"{readings.source}, lines {line} and {other_line}",
             came=f"numbers that begin anew {len(down)} times in the order of time",
             allowed=f"{most - 1} times, as no number is there more than {most} times",
             cure="Check the times, where a clock passed midnight too, and the cycles; number each group from 1.",
@@ -348,9 +348,9 @@ def refuse_far_orientations(
     )
 
 
-def _angle(one: Array, other: Array) -> Array:
+def _angle(rotation: Array, other: Array) -> Array:
     """Return by how much rotations differ [rad], ``(n,)``."""
-    trace = np.einsum("nij,nij->n", one, other)
+    trace = np.einsum("nij,nij->n", rotation, other)
     return np.asarray(np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0)))
 
 
@@ -386,7 +386,7 @@ _SAME_SHARE: Final = 5e-4
 #: A robot that has less than this share of the rows of another one was not measured, but its name mistyped.
 _FEW_ROWS: Final = 0.2
 #: So many more lines are named.
-_TOLD: Final = 5
+_NAMED: Final = 5
 _FILES: Final = {"paths": "paths", "settling": "poses over time", "forces": "pushes"}
 
 
@@ -479,14 +479,14 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
     )
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     group = group.reshape(-1)
-    made = []
+    groups = []
     for number in np.argsort(first, kind="stable"):
         rows = np.flatnonzero(group == number)
         row = int(rows[0])
         test, pose = (_pose_name(names, row) for names in (readings.criterion, readings.pose))
         rows = rows[_order(readings, rows, drift=test == "dAP")]
         command = plan.poses[pose]
-        made.append(
+        groups.append(
             Cycles(
                 test=test,
                 robot=_pose_name(readings.robot, row),
@@ -502,25 +502,25 @@ def cycles_of(plan: PerformancePlan, readings: AttainedPoses, alignment: Alignme
                 line=readings.line[rows],
             )
         )
-    return tuple(sorted(made, key=lambda one: _place_in(plan, one)))
+    return tuple(sorted(groups, key=lambda cycles: _place_in(plan, cycles)))
 
 
-def _place_in(plan: PerformancePlan, one: Cycles) -> tuple[object, ...]:
+def _place_in(plan: PerformancePlan, group: Cycles) -> tuple[object, ...]:
     """Return by what cycles are ordered: the plan, and names of robots."""
-    number, test = next((k, test) for k, test in enumerate(plan.tests) if test.id == one.test)
-    approach = test.approaches.index(one.approach) if one.approach else 0
-    return number, one.robot, test.places.index(one.pose), approach, -one.velocity, -one.load
+    number, test = next((k, test) for k, test in enumerate(plan.tests) if test.id == group.test)
+    approach = test.approaches.index(group.approach) if group.approach else 0
+    return number, group.robot, test.places.index(group.pose), approach, -group.velocity, -group.load
 
 
 def _planned_conditions(plan: PerformancePlan, readings: AttainedPoses) -> Array:
     """Return velocity and load of each row as the plan has them, ``(n, 2)``, or refuse others."""
-    made = np.empty((len(readings.cycle), 2))
+    conditions = np.empty((len(readings.cycle), 2))
     for planned in plan.tests:
         rows = np.flatnonzero(readings.criterion.are(planned.id))
         pairs = (("velocity", readings.velocity, planned.velocities), ("load", readings.load, planned.loads))
         for column, (name, read, known) in enumerate(pairs):
             apart = np.abs(read[rows, None] - np.array(known))
-            made[rows, column] = np.array(known)[apart.argmin(axis=1)]
+            conditions[rows, column] = np.array(known)[apart.argmin(axis=1)]
             other = np.flatnonzero(apart.min(axis=1) > _SAME_SHARE)
             if len(other):
                 row = int(rows[other[0]])
@@ -532,7 +532,7 @@ def _planned_conditions(plan: PerformancePlan, readings: AttainedPoses) -> Array
                     allowed=", ".join(f"{100.0 * share:g} %" for share in known),
                     cure="Correct it, or plan and measure the whole test under this condition too.",
                 )
-    return made
+    return conditions
 
 
 def _pose_name(names: Names, row: int) -> str:
@@ -547,10 +547,10 @@ def _order(readings: AttainedPoses, rows: NDArray[np.intp], *, drift: bool) -> N
     cycle = readings.cycle[rows][order]
     twice = np.flatnonzero(cycle[1:] == cycle[:-1])
     if len(twice):
-        one, other = (int(readings.line[rows[order[twice[0] + k]]]) for k in (0, 1))
+        line, other_line = (int(readings.line[rows[order[twice[0] + k]]]) for k in (0, 1))
         raise InputError(
             f"cycle {int(cycle[twice[0]])} appears twice under the same conditions",
-            where=f"{readings.source}, lines {one} and {other}",
+            where=f"{readings.source}, lines {line} and {other_line}",
             allowed="approaches in rows of vAP alone",
             cure="Correct the criterion, or the cycle.",
         )
@@ -567,17 +567,22 @@ def _check_names(plan: PerformancePlan, readings: AttainedPoses) -> None:
         if planned is None or TESTS[test].readings != "poses":
             raise _no_such_test(plan, readings, test)
         for pose in readings.pose.names:
-            here = rows & readings.pose.are(pose)
-            if here.any() and pose not in planned.places:
+            named = rows & readings.pose.are(pose)
+            if named.any() and pose not in planned.places:
                 raise _refused(
-                    readings, here, "pose", f"the plan does not have this pose in the test {test}", pose, planned.places
+                    readings,
+                    named,
+                    "pose",
+                    f"the plan does not have this pose in the test {test}",
+                    pose,
+                    planned.places,
                 )
         if test == "vAP":
             for approach in readings.approach.names:
-                here = rows & readings.approach.are(approach)
-                if here.any() and approach not in planned.approaches:
-                    what = "the plan does not have this approach" if approach else "the approach is missing"
-                    raise _refused(readings, here, "approach", what, approach, planned.approaches)
+                named = rows & readings.approach.are(approach)
+                if named.any() and approach not in planned.approaches:
+                    message = "the plan does not have this approach" if approach else "the approach is missing"
+                    raise _refused(readings, named, "approach", message, approach, planned.approaches)
         nameless = rows & readings.robot.are("")
         if test == "E" and nameless.any():
             raise InputError(
@@ -599,11 +604,13 @@ def _check_robots(readings: AttainedPoses, test: str, rows: NDArray[np.bool_]) -
     if "" not in counts and counts[fewest] >= _FEW_ROWS * counts[most]:
         return
     if "" in counts:
-        what = f"the robot is named in some rows of the test {test} and in others not"
+        message = f"the robot is named in some rows of the test {test} and in others not"
     else:
-        what = f"the robot {fewest} has few rows in the test {test}: {counts[fewest]}, where {most} has {counts[most]}"
+        message = (
+            f"the robot {fewest} has few rows in the test {test}: {counts[fewest]}, where {most} has {counts[most]}"
+        )
     raise InputError(
-        what,
+        message,
         where=f"{readings.source}, line {_first(readings, rows & readings.robot.are(fewest))}, column robot",
         came=fewest or None,
         allowed=", ".join(name or "no name" for name in counts if name != fewest),
@@ -619,12 +626,12 @@ def _no_such_test(plan: PerformancePlan, readings: AttainedPoses, test: str) -> 
     known = [planned.id for planned in plan.tests if TESTS[planned.id].readings == "poses"]
     rows = readings.criterion.are(test)
     if TEST_OF.get(test, test) != test:
-        what = f"{test} is evaluated from the rows of {TEST_OF[test]}"
-        return _refused(readings, rows, "criterion", what, test, known, f"Name the test: {TEST_OF[test]}.")
+        message = f"{test} is evaluated from the rows of {TEST_OF[test]}"
+        return _refused(readings, rows, "criterion", message, test, known, f"Name the test: {TEST_OF[test]}.")
     if test in TESTS and TESTS[test].readings != "poses":
-        what = f"{test} is not evaluated from poses"
+        message = f"{test} is not evaluated from poses"
         cure = f"It belongs in the file of {_FILES[TESTS[test].readings]}."
-        return _refused(readings, rows, "criterion", what, test, known, cure)
+        return _refused(readings, rows, "criterion", message, test, known, cure)
     if test in TESTS:
         cure = "Plan the test, or remove its rows."
         return _refused(readings, rows, "criterion", "the plan does not have this test", test, known, cure)
@@ -635,17 +642,17 @@ def _refused(
     readings: AttainedPoses,
     rows: NDArray[np.bool_],
     column: str,
-    what: str,
-    came: str,
+    message: str,
+    name: str,
     known: Iterable[str],
     cure: str | None = None,
 ) -> InputError:
     known = tuple(known)
-    near = nearest_names(came, known, 1, 0.6)
+    near = nearest_names(name, known, 1, 0.6)
     return InputError(
-        what,
+        message,
         where=f"{readings.source}, line {_first(readings, rows)}, column {column}",
-        came=came or None,
+        came=name or None,
         allowed=", ".join(known) or "nothing: the plan has no tests of poses",
         cure=cure or (f"Did you mean {near[0]}?" if near else "Correct it, or use the plan that was measured."),
     )
@@ -677,15 +684,15 @@ def _check_nearest(plan: PerformancePlan, readings: AttainedPoses, position: Arr
     wrong = np.flatnonzero(apart.min(axis=1) < _NEARER * own)
     if len(wrong):
         row = int(wrong[0])
-        there = list(dict.fromkeys(names))[int(apart[row].argmin())]
-        lines = [str(int(line)) for line in readings.line[wrong[1 : 1 + _TOLD]]]
+        nearest = list(dict.fromkeys(names))[int(apart[row].argmin())]
+        lines = [str(int(line)) for line in readings.line[wrong[1 : 1 + _NAMED]]]
         also = f"; so also line{'s' * (len(lines) != 1)} {', '.join(lines)}" if lines else ""
         also += " and others" if len(wrong) > 1 + len(lines) else ""
         raise InputError(
             f"{len(wrong)} pose{'s' * (len(wrong) != 1)} at another place than the plan has it",
             where=f"{readings.source}, line {int(readings.line[row])}, column pose",
-            came=f"{_pose_name(readings.pose, row)}, and it lies at {there}, {1e3 * apart[row].min():.4g} mm from it, "
-            f"{1e3 * own[row]:.4g} mm from {_pose_name(readings.pose, row)}{also}",
+            came=f"{_pose_name(readings.pose, row)}, and it lies at {nearest}, {1e3 * apart[row].min():.4g} mm from "
+            f"it, {1e3 * own[row]:.4g} mm from {_pose_name(readings.pose, row)}{also}",
             cure="Correct the name, take the plan that was measured, or remove the cycle.",
         )
 
@@ -695,11 +702,11 @@ def _check_copies(readings: AttainedPoses) -> None:
     if not np.isfinite(readings.time).all() or 2 * len(np.unique(readings.time)) < len(readings.time):
         return
     read = np.column_stack([readings.time, readings.position])
-    _, first, which = np.unique(read, axis=0, return_index=True, return_inverse=True)
-    copies = np.flatnonzero(first[which.reshape(-1)] != np.arange(len(read)))
+    _, first, inverse = np.unique(read, axis=0, return_index=True, return_inverse=True)
+    copies = np.flatnonzero(first[inverse.reshape(-1)] != np.arange(len(read)))
     if len(copies):
         row = int(copies[0])
-        other = int(first[which.reshape(-1)[row]])
+        other = int(first[inverse.reshape(-1)[row]])
         raise InputError(
             f"{len(copies)} row{'s' * (len(copies) != 1)} with the time and the place of another one",
             where=f"{readings.source}, lines {int(readings.line[other])} and {int(readings.line[row])}",

@@ -105,32 +105,32 @@ def outlying_steps(time: Array, position: Array, velocity: float | None) -> Outl
 
 
 def refuse_outlying(
-    samples: Samples, rows: NDArray[np.intp], position: Array, found: OutlyingSteps, cycle: int, clock: Clock
+    samples: Samples, rows: NDArray[np.intp], position: Array, steps: OutlyingSteps, cycle: int, clock: Clock
 ) -> None:
     """Refuse a record with samples that no tip can have passed, naming them.
 
     Args:
         rows: Of the record in `samples`, in its order.
         position: Of these [m], ``(n, 3)``.
-        found: What no tip can do there.
+        steps: What no tip can do there.
         cycle: Its number; 0 for a stream.
         clock: Of the record.
 
     Raises:
         InputError: If there are such steps; of times that are rounded too coarsely to tell, this is said instead.
     """
-    if not len(found.before):
+    if not len(steps.before):
         return
     if clock.is_coarse:
         raise InputError(
             "times of samples are rounded too coarsely to say how fast the tip moves",
-            where=f"{samples.source}, line {samples.line[rows[found.before[0]]]}, column time",
+            where=f"{samples.source}, line {samples.line[rows[steps.before[0]]]}, column time",
             came=f"times to {clock.resolution:g} s, samples {float(np.diff(clock.time).mean()):.4g} s apart",
             allowed="a tenth of the time between two samples, or less",
             cure="Write the times with more decimals.",
         )
     line, name = samples.line[rows], _name(samples, int(rows[0]), cycle)
-    outlying, jumps = _groups(clock.time, position, found)
+    outlying, jumps = _groups(clock.time, position, steps)
     if outlying:
         shown = [_lines(line[first : last + 1].tolist()) for first, last, _ in outlying[:_NAMED]]
         more = f" and {len(outlying) - _NAMED} more such places" if len(outlying) > _NAMED else ""
@@ -153,13 +153,13 @@ def refuse_outlying(
 
 
 def _groups(
-    time: Array, position: Array, found: OutlyingSteps
+    time: Array, position: Array, steps: OutlyingSteps
 ) -> tuple[list[tuple[int, int, float]], list[tuple[int, float]]]:
     """Return first, last and distance of outlying samples in a row, and where the record goes on elsewhere."""
     outlying: list[tuple[int, int, float]] = []
     jumps: list[tuple[int, float]] = []
     last = -1
-    for before, pace in zip(found.before.tolist(), found.pace, strict=True):
+    for before, pace in zip(steps.before.tolist(), steps.pace, strict=True):
         first = before + 1
         if first <= last + 1 and outlying:
             continue
@@ -204,7 +204,7 @@ class Run:
     conditions: Conditions  #: As shares.
     cycles: tuple[Cycle, ...]  #: In their order.
     planned: int  #: How many there should be.
-    found: FoundStream | None  #: What was found in the stream from which they are; None where the file numbers them.
+    stream: FoundStream | None  #: What was found in the stream from which they are; None where the file numbers them.
 
     def status(self, *, coarse: bool) -> Status:
         """Return whether a value of it can be relied on."""
@@ -287,13 +287,13 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
         path = CommandedPath.of(plan.paths[part.place], reoriented=test == "AT-reorientation")
         velocity = plan.rated_velocity * (part.conditions.velocity or 1.0)
         cycles: list[Cycle] = []
-        found = None
+        stream = None
         for number, rows in part.cycles():
-            where = f"{samples.source}, lines {samples.line[rows[0]]} to {samples.line[rows[-1]]}"
+            location = f"{samples.source}, lines {samples.line[rows[0]]} to {samples.line[rows[-1]]}"
             if len(rows) < LEAST_SAMPLES:
                 raise InputError(
                     "there are too few samples of this cycle",
-                    where=where,
+                    where=location,
                     came=f"{len(rows)} samples",
                     allowed=f"{LEAST_SAMPLES} or more",
                     cure="Sample faster, or leave the cycle out.",
@@ -303,25 +303,25 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
             outlying = outlying_steps(clock.time, position, velocity)
             if outlying.single:
                 refuse_outlying(samples, rows, position, outlying, number, clock)
-            here = found_in(test, path, clock.time, position, velocity)
-            spans = here.cycles
+            record_stream = found_in(test, path, clock.time, position, velocity)
+            spans = record_stream.cycles
             if number:
                 if len(spans) > 1:
                     raise InputError(
                         f"cycle {number} of {part.place} runs the path {len(spans)} times",
-                        where=where,
+                        where=location,
                         came=f"{len(spans)} cycles under one number",
                         allowed="one run of the path",
                         cure="Number the cycles, or leave the cells of the column cycle empty: then they are found.",
                     )
                 spans = spans if len(spans) == 1 else ((0, len(rows) - 1),)
             else:
-                found = here
+                stream = record_stream
                 if not spans:
                     raise InputError(
                         f"no cycle of the path {part.place} is found in the stream",
-                        where=where,
-                        came=f"{len(here.motions)} motions, {len(here.dwells)} dwells",
+                        where=location,
+                        came=f"{len(record_stream.motions)} motions, {len(record_stream.dwells)} dwells",
                         allowed="motions from the begin of the path to its end, near the plan",
                         cure="Check the name of the path, the unit, and how the instrument is tied to the robot's "
                         "base, or number the cycles.",
@@ -344,4 +344,4 @@ def runs_of(plan: PerformancePlan, samples: Samples, transform: Array, test: str
                     )
                 )
             refuse_outlying(samples, rows, position, outlying, number, clock)
-        yield Run(test, path, velocity, part.conditions, tuple(cycles), planned.cycles, found)
+        yield Run(test, path, velocity, part.conditions, tuple(cycles), planned.cycles, stream)

@@ -81,12 +81,12 @@ def settling_values(
         known = () if planned is None else tuple(dict.fromkeys((*planned.places, *planned.approaches)))
         for part in parts_of(samples, test, known):
             assert planned is not None
-            here = [
+            part_curves = [
                 _cycle(plan, samples, transform, test, part, number, rows, instrument.sigma)
                 for number, rows in part.cycles()
             ]
-            curves += here
-            values += _values(here, planned.cycles, instrument)
+            curves += part_curves
+            values += _values(part_curves, planned.cycles, instrument)
     return values, curves
 
 
@@ -171,8 +171,8 @@ def _cycle(
     else:
         crossing = 2 * band / max(float(speed), 1e-12)
         slow = step > COARSE * crossing if settles else _LEAST_SAMPLES * step > min(settled, 3 * width)
-        there = slice(entered, int(np.searchsorted(time, stay)) + 1)
-        slow |= float(np.diff(time[there]).max(initial=0.0)) > COARSE * max(settled, crossing)
+        near_end = slice(entered, int(np.searchsorted(time, stay)) + 1)
+        slow |= float(np.diff(time[near_end]).max(initial=0.0)) > COARSE * max(settled, crossing)
         few = not settles and _excursion(passing, entered + 1 + int(later.argmax())) < _LEAST_OUTSIDE
         blurred = not settles and overshoot - band < 3 * sigma
         # noise may put an excursion inside the band, or outside of it
@@ -211,23 +211,23 @@ def _place(plan: PerformancePlan, test: str, part: Part) -> str:
     return part.place if part.place == first else f"{first}-{part.place}"
 
 
-def _refuse_few(samples: int, where: str) -> None:
+def _refuse_few(samples: int, place: str) -> None:
     if samples < LEAST_SAMPLES:
         raise InputError(
             "there are too few samples of this cycle",
-            where=where,
+            where=place,
             came=f"{samples} samples",
             allowed=f"{LEAST_SAMPLES} or more",
             cure="Sample faster and longer, or leave the cycle out.",
         )
 
 
-def _refuse_incomplete(outside: NDArray[np.bool_], distance: Array, last: int, band: float, where: str) -> None:
+def _refuse_incomplete(outside: NDArray[np.bool_], distance: Array, last: int, band: float, place: str) -> None:
     """Refuse a record that ends before the tip stands, or begins when it is within the band already."""
     if outside[-last:].any():
         raise InputError(
             "the record ends before the tip stands",
-            where=where,
+            where=place,
             came=f"{1e3 * distance[-last:].max():.3f} mm from where it ends, within the last tenth of the samples",
             allowed=f"{1e3 * band:g} mm, the limit band of the plan",
             cure="Record longer, or plan a wider limit band: the instrument's noise must lie well within it.",
@@ -235,14 +235,14 @@ def _refuse_incomplete(outside: NDArray[np.bool_], distance: Array, last: int, b
     if not outside[0]:
         raise InputError(
             "the record begins when the tip is in the limit band already",
-            where=where,
+            where=place,
             came=f"{1e3 * distance[0]:.3f} mm from where it ends",
             allowed=f"a first sample further away than {1e3 * band:g} mm",
             cure="Record from before the move on.",
         )
 
 
-def _refuse_other_times(time: Array, position: Array, where: str) -> None:
+def _refuse_other_times(time: Array, position: Array, place: str) -> None:
     over = max(len(time) // 200, 1)
     size = np.linalg.norm(position[over:] - position[:-over], axis=1)
     pace = float(np.quantile(size / (time[over:] - time[:-over]), 0.995))
@@ -250,21 +250,21 @@ def _refuse_other_times(time: Array, position: Array, where: str) -> None:
     if pace > _FASTEST or (pace < _SLOWEST and way > _FAR):
         raise InputError(
             f"the tip would move {'faster than any' if pace > _FASTEST else 'more slowly than any'} robot's",
-            where=where,
+            where=place,
             came=f"{1e3 * pace:.4g} mm/s at its fastest",
             allowed=f"{1e3 * _SLOWEST:g} to {1e3 * _FASTEST:g} mm/s",
             cure="Write the times in seconds.",
         )
 
 
-def _refuse_away_again(time: Array, distance: Array, band: float, where: str, lines: NDArray[np.intp]) -> None:
+def _refuse_away_again(time: Array, distance: Array, band: float, place: str, lines: NDArray[np.intp]) -> None:
     stood = [last for first, last in spans_of(distance <= band) if time[last] - time[first] > _STOOD]
     if not stood or distance[stood[0] :].max() <= _AGAIN * band:
         return
     again = stood[0] + int(distance[stood[0] :].argmax())
     raise InputError(
         "the tip goes away again after it came to rest",
-        where=f"{where}, about line {lines[again]}",
+        where=f"{place}, about line {lines[again]}",
         came=f"{1e3 * distance[again]:.4g} mm from where it ends, after it stood within the limit band",
         allowed="one way to the pose in each cycle",
         cure="Give each way a number of its own in the column cycle; remove samples that the instrument read wrongly.",
@@ -343,17 +343,19 @@ def _start(time: Array, position: Array, band: float) -> float:
     away = np.linalg.norm(position - position[0], axis=1)
     gone = int((away > 10 * band).argmax()) or len(away)
     stood = position[: int(np.flatnonzero(away[:gone] <= band)[-1]) + 1]
-    rest = np.median(stood[: max(len(stood) // 2, 5)], axis=0)
-    way = float(np.linalg.norm(position[-5:].mean(axis=0) - rest))
+    rest_position = np.median(stood[: max(len(stood) // 2, 5)], axis=0)
+    way = float(np.linalg.norm(position[-5:].mean(axis=0) - rest_position))
     low = max(_EARLY * band, _ABOVE_NOISE * noise_of(position))
     high = max(min(_LATE / _EARLY * low, _OF_WAY * way), 1.5 * low)
-    travelled = np.linalg.norm(position - rest, axis=1)
+    travelled = np.linalg.norm(position - rest_position, axis=1)
     last = int((travelled > high).argmax()) or len(travelled) - 1
     inside = np.flatnonzero(travelled[:last] <= low)
     first = int(inside[-1]) + 1 if len(inside) else 0
     last = min(max(last, first + 1), len(travelled) - 1)
     rows = np.arange(first, last + 1)
-    along = np.maximum((position[rows] - rest) @ (position[last] - rest) / travelled[last], 0.25 * low)
+    along = np.maximum(
+        (position[rows] - rest_position) @ (position[last] - rest_position) / travelled[last], 0.25 * low
+    )
     since = time[rows] - time[first]
     begins = []
     for power in _POWERS if len(rows) >= _LEAST_ROWS else (2.0,):

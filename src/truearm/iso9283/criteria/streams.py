@@ -102,8 +102,8 @@ def _even(time: Array, number: NDArray[np.intp] | Array, resolution: float) -> A
         low, high = (slope + sign * 4.0 * resolution / number[-1] for sign in (-1.0, 1.0))
         for _ in range(_CUTS):
             third = (high - low) / 3.0
-            one, other = (float(np.ptp(off - b * number)) for b in (low + third, high - third))
-            low, high = (low, high - third) if one < other else (low + third, high)
+            spread, other_spread = (float(np.ptp(off - b * number)) for b in (low + third, high - third))
+            low, high = (low, high - third) if spread < other_spread else (low + third, high)
         slope = 0.5 * (low + high)
         left = off - slope * number
         begin = 0.5 * (left.min() + left.max())
@@ -198,8 +198,8 @@ class CommandedPath:
             out, onward = (self.vertices[0] - self.centre) / self.radius, self.way.direction(np.zeros(1))[0]
             away = points - self.centre
             turn = 2 * math.pi * self.radius
-            found = self.radius * np.arctan2(away @ onward, away @ out)
-            return np.asarray(found + turn * np.round((near - found) / turn))
+            arc = self.radius * np.arctan2(away @ onward, away @ out)
+            return np.asarray(arc + turn * np.round((near - arc) / turn))
         best, foot = np.full(len(points), np.inf), np.array(near)
         last = len(self.vertices) - 2
         for side in range(last + 1):
@@ -462,7 +462,7 @@ class Cycle:
         return int(self.lines[0])
 
 
-def along_path(path: CommandedPath, position: Array, where: str) -> Array:
+def along_path(path: CommandedPath, position: Array, place: str) -> Array:
     """Return the arc length of the foot of each sample on the commanded path [m], ``(n,)``.
 
     The samples of a cycle are matched with places of the path so that the sum of squared distances is least and no
@@ -472,7 +472,7 @@ def along_path(path: CommandedPath, position: Array, where: str) -> Array:
 
     Args:
         position: Samples of one cycle in the base frame [m], ``(n, 3)``, in the order of time.
-        where: File and lines, for the refusal.
+        place: File and lines, for the refusal.
 
     Raises:
         InputError: If the samples do not come near the path, or run only a part of it, or run it in the other
@@ -484,7 +484,7 @@ def along_path(path: CommandedPath, position: Array, where: str) -> Array:
     few = position[chosen]
     match, distance = _matched(few, points)
     moving = _moving(few, _STEP * path.extent)
-    _refuse_other_path(path, few[moving], points, float(np.median(distance[moving])), where)
+    _refuse_other_path(path, few[moving], points, float(np.median(distance[moving])), place)
     near = np.interp(np.arange(len(position)), chosen, places[match])
     step = float(np.abs(np.diff(near)).max(initial=0.0))
     along = path.feet(position, near, 0.02 * path.length + 2 * step)
@@ -492,7 +492,7 @@ def along_path(path: CommandedPath, position: Array, where: str) -> Array:
     if high - low < _LEAST_RUN * path.length:
         raise InputError(
             f"the samples run only a part of the path {path.path.name}",
-            where=where,
+            where=place,
             came=f"{1e3 * max(low, 0.0):.0f} to {1e3 * high:.0f} mm of {1e3 * path.length:.0f} mm, in this direction",
             allowed=f"{100 * _LEAST_RUN:.0f} % of the path or more, from its begin to its end",
             cure="Record the whole cycle, and run the path in the direction of the plan.",
@@ -509,7 +509,7 @@ def pace_along(path: CommandedPath, time: Array, along: Array) -> float:
     return float(np.inf) if lasts <= 0.0 else float(places[1] - places[0]) / lasts
 
 
-def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity: float, where: str) -> None:
+def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity: float, place: str) -> None:
     """Refuse a cycle that is run so fast or so slowly that its times are not seconds, or it is another's.
 
     A robot is not faster than commanded, and may be slower where joints come to their limits.
@@ -517,7 +517,7 @@ def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity:
     Args:
         time, along: Of the samples [s], and the arc lengths of their feet [m], ``(n,)``.
         velocity: Commanded [m/s].
-        where: File and lines.
+        place: File and lines.
 
     Raises:
         InputError: If the pace is above twice the commanded velocity, or below a fiftieth of it.
@@ -527,7 +527,7 @@ def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity:
         return
     raise InputError(
         f"the path {path.path.name} was run much {'faster' if pace > velocity else 'slower'} than commanded",
-        where=where,
+        where=place,
         came=f"{_apart(pace, _FASTER * velocity if pace > velocity else _SLOWEST * velocity)[0]} mm/s in the middle "
         "half",
         allowed=f"{1e3 * _SLOWEST * velocity:.4g} to {1e3 * _FASTER * velocity:.4g} mm/s; commanded are "
@@ -539,11 +539,11 @@ def refuse_other_times(path: CommandedPath, time: Array, along: Array, velocity:
 
 def _moving(few: Array, step: float) -> NDArray[np.intp]:
     """Return samples of which each is at least `step` from the one before it [m]."""
-    kept = [0]
+    retained = [0]
     for k, apart in enumerate(np.linalg.norm(np.diff(few, axis=0), axis=1).tolist(), 1):
-        if apart >= step or np.linalg.norm(few[k] - few[kept[-1]]) >= step:
-            kept.append(k)
-    return np.array(kept, dtype=np.intp)
+        if apart >= step or np.linalg.norm(few[k] - few[retained[-1]]) >= step:
+            retained.append(k)
+    return np.array(retained, dtype=np.intp)
 
 
 def _matched(few: Array, points: Array) -> tuple[NDArray[np.intp], Array]:
@@ -567,7 +567,7 @@ def _monotone(cost: Array) -> NDArray[np.intp]:
     return match
 
 
-def _refuse_other_path(path: CommandedPath, few: Array, points: Array, distance: float, where: str) -> None:
+def _refuse_other_path(path: CommandedPath, few: Array, points: Array, distance: float, place: str) -> None:
     """Refuse samples of another path, in another direction, or so far beside that planes through the path tell nothing.
 
     Shape and direction are judged once the samples are moved onto the path's middle: a robot that is off by as much as
@@ -582,7 +582,7 @@ def _refuse_other_path(path: CommandedPath, few: Array, points: Array, distance:
     if back <= min(allowed, _REVERSED * ahead):
         raise InputError(
             f"the samples run the path {path.path.name} backwards",
-            where=where,
+            where=place,
             cure="Run it in the direction of the plan.",
         )
     if distance <= allowed:
@@ -591,34 +591,34 @@ def _refuse_other_path(path: CommandedPath, few: Array, points: Array, distance:
     if ahead <= allowed and beside <= most:
         return
     if ahead <= allowed and beside <= path.extent:
-        came, most_came = _apart(beside, most)
+        measured, most_allowed = _apart(beside, most)
         raise InputError(
             f"the samples run the path {path.path.name} too far beside it for planes through it to tell anything",
-            where=where,
-            came=f"{came} mm beside it as a whole",
-            allowed=f"{most_came} mm",
+            where=place,
+            came=f"{measured} mm beside it as a whole",
+            allowed=f"{most_allowed} mm",
             cure="Check how the instrument is tied to the robot's base; or plan in a larger cube.",
         )
     least = float(np.median(np.sqrt(((few[:, None] - points[None]) ** 2).sum(axis=2)).min(axis=1)))
     other_order = least <= allowed
-    came, most_came = _apart(distance if other_order else max(least, allowed), allowed)
+    measured, most_allowed = _apart(distance if other_order else max(least, allowed), allowed)
     raise InputError(
         f"the samples run the path {path.path.name} in another order"
         if other_order
         else f"the samples never come near the path {path.path.name}",
-        where=where,
-        came=f"{came} mm from it, half of the samples further",
-        allowed=f"{most_came} mm",
+        where=place,
+        came=f"{measured} mm from it, half of the samples further",
+        allowed=f"{most_allowed} mm",
         cure="Run it as the plan says."
         if other_order
         else "Check the name of the path, the unit, and how the instrument is tied to the robot's base.",
     )
 
 
-def _apart(came: float, allowed: float) -> tuple[str, str]:
+def _apart(measured: float, allowed: float) -> tuple[str, str]:
     """Return two lengths in mm, or velocities in mm/s, with as many decimals as it takes to see that they differ."""
     for decimals in range(1, 7):
-        both = f"{1e3 * came:.{decimals}f}", f"{1e3 * allowed:.{decimals}f}"
+        both = f"{1e3 * measured:.{decimals}f}", f"{1e3 * allowed:.{decimals}f}"
         if both[0] != both[1]:
             break
     return both

@@ -24,7 +24,7 @@ from truearm.iso9283.planning.records import Samples
 _MIDDLE = (0.25, 0.75)
 #: Of a swing with a frequency of this share of one over the window, smoothing and the time between two samples leave
 #: this share or more.
-_BANDWIDTH, _KEPT = 0.325, 0.88
+_BANDWIDTH, _SWING_LEFT = 0.325, 0.88
 #: Noise may be this share of the commanded velocity, if a window of at most this share of the middle half does it.
 _QUIET, _LONGEST_WINDOW = 0.002, 0.05
 #: Excess kurtosis that the cycles' velocities may have: with it the interval of RV is a third wider than that of
@@ -55,7 +55,7 @@ class VelocityCurves:
     least: Array  #: least, largest: of each cycle there [m/s], ``(cycles,)``.
     largest: Array
     noise: Array  #: Standard deviation of the velocity that the instrument alone gives [m/s], ``(cycles,)``.
-    found: FoundStream | None  #: What was found in the stream, if it was one.
+    stream: FoundStream | None  #: What was found in the stream, if it was one.
 
     @property
     def bandwidth(self) -> float:
@@ -106,7 +106,7 @@ def _curves(run: Run, instrument: Instrument) -> VelocityCurves:
         np.array([low for low, _ in ranges]),
         np.array([high for _, high in ranges]),
         np.array(noises),
-        run.found,
+        run.stream,
     )
 
 
@@ -131,9 +131,9 @@ def _cycle(
     ends = [float(np.interp(place, run, time)) for place in middle]
     inside = (time >= ends[0]) & (time <= ends[1])
     mean = (middle[1] - middle[0]) / max(ends[1] - ends[0], step)
-    there = velocity[inside] if inside.any() else np.array([mean])
+    in_middle = velocity[inside] if inside.any() else np.array([mean])
     noise = sigma * np.sqrt(12.0 * step / window**3)
-    return window, time, along, velocity, mean, (float(there.min()), float(there.max())), float(noise)
+    return window, time, along, velocity, mean, (float(in_middle.min()), float(in_middle.max())), float(noise)
 
 
 def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
@@ -164,7 +164,7 @@ def _values(curve: VelocityCurves, instrument: Instrument) -> list[Value]:
         low, high = (float(np.sqrt(0.5 * degrees / gammaincinv(0.5 * degrees, p))) for p in (0.975, 0.025))
         interval_rv = (3 * spread / v * low, 3 * spread / v * high)
         few, many = _largest_of(ranges)
-        interval_fv = (max(few - noise_range, 0.0), many / _KEPT)
+        interval_fv = (max(few - noise_range, 0.0), many / _SWING_LEFT)
     return [
         Value(
             "AV",

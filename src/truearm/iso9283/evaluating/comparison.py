@@ -84,58 +84,58 @@ def _place(points: Any, turns: list[Array]) -> dict[str, Any]:
     }
 
 
-def same_place(one: Place, other: Place) -> bool:
+def same_place(place: Place, other: Place) -> bool:
     """Return whether two results have a place alike."""
-    return _same(one.points_mm, other.points_mm, _SAME_LENGTH) and _same(one.turns, other.turns, _SAME_TURN)
+    return _same(place.points_mm, other.points_mm, _SAME_LENGTH) and _same(place.turns, other.turns, _SAME_TURN)
 
 
-def _same(one: tuple[_Row, ...], other: tuple[_Row, ...], within: float) -> bool:
-    return len(one) == len(other) and bool(np.allclose(one, other, rtol=0.0, atol=within))
+def _same(rows: tuple[_Row, ...], other_rows: tuple[_Row, ...], within: float) -> bool:
+    return len(rows) == len(other_rows) and bool(np.allclose(rows, other_rows, rtol=0.0, atol=within))
 
 
-def unlike_rated(id_: str, conditions: Mapping[str, float | str], one: Rated, other: Rated) -> str | None:
+def unlike_rated(id_: str, conditions: Mapping[str, float | str], rated: Rated, other: Rated) -> str | None:
     """Return why values of a criterion were measured under other rated conditions, None if they were not."""
     loaded = conditions.get("load_percent", 100.0 if id_ == "compliance" else 0.0)
-    if loaded != 0.0 and not _near(one.load_kg, other.load_kg):
-        return f"the rated load was {other.load_kg:g} kg there, and is {one.load_kg:g} kg here"
-    if TESTS[TEST_OF[id_]].readings == "paths" and not _near(one.velocity_mm_s, other.velocity_mm_s):
-        return f"the rated velocity was {other.velocity_mm_s:g} mm/s there, and is {one.velocity_mm_s:g} mm/s here"
+    if loaded != 0.0 and not _near(rated.load_kg, other.load_kg):
+        return f"the rated load was {other.load_kg:g} kg there, and is {rated.load_kg:g} kg here"
+    if TESTS[TEST_OF[id_]].readings == "paths" and not _near(rated.velocity_mm_s, other.velocity_mm_s):
+        return f"the rated velocity was {other.velocity_mm_s:g} mm/s there, and is {rated.velocity_mm_s:g} mm/s here"
     return None
 
 
-def unlike_plans(id_: str, where: str, one: PlanOfResult, other: PlanOfResult) -> str | None:
+def unlike_plans(id_: str, location: str, plan: PlanOfResult, other: PlanOfResult) -> str | None:
     """Return why values of a criterion were planned otherwise, None if they were not."""
     test = TEST_OF[id_]
-    if test in ("t", "posing-time") and not _near(one.limit_band_mm, other.limit_band_mm):
-        return f"the limit band was {other.limit_band_mm:g} mm there, and is {one.limit_band_mm:g} mm here"
-    if test == "dAP" and not _near(one.drift_h, other.drift_h):
-        return f"drift was planned over {other.drift_h:g} h there, and over {one.drift_h:g} h here"
-    for name in sorted({*one.places, *other.places}):
-        if _is_of(name, test, where):
-            here, there = one.places.get(name), other.places.get(name)
-            if here is None or there is None or not same_place(here, there):
+    if test in ("t", "posing-time") and not _near(plan.limit_band_mm, other.limit_band_mm):
+        return f"the limit band was {other.limit_band_mm:g} mm there, and is {plan.limit_band_mm:g} mm here"
+    if test == "dAP" and not _near(plan.drift_h, other.drift_h):
+        return f"drift was planned over {other.drift_h:g} h there, and over {plan.drift_h:g} h here"
+    for name in sorted({*plan.places, *other.places}):
+        if _is_of(name, test, location):
+            place, other_place = plan.places.get(name), other.places.get(name)
+            if place is None or other_place is None or not same_place(place, other_place):
                 return "poses or paths were planned elsewhere"
     return None
 
 
-def unlike_bandwidths(one: float | None, other: float | None) -> str | None:
+def unlike_bandwidths(bandwidth: float | None, other: float | None) -> str | None:
     """Return why values of FV were read otherwise, None if they were not."""
-    if one is None or other is None or max(one, other) <= _SAME_BANDWIDTH * min(one, other):
+    if bandwidth is None or other is None or max(bandwidth, other) <= _SAME_BANDWIDTH * min(bandwidth, other):
         return None
-    return f"fluctuation was read up to {other:.3g} Hz there, and up to {one:.3g} Hz here"
+    return f"fluctuation was read up to {other:.3g} Hz there, and up to {bandwidth:.3g} Hz here"
 
 
-def _near(one: float, other: float) -> bool:
-    return abs(one - other) <= _SAME_SHARE * max(abs(one), abs(other))
+def _near(value: float, other: float) -> bool:
+    return abs(value - other) <= _SAME_SHARE * max(abs(value), abs(other))
 
 
-def _is_of(name: str, test: str, where: str) -> bool:
+def _is_of(name: str, test: str, place: str) -> bool:
     """Return whether a value has to do with a place: ``P1-D10`` with P1 and D10, ``rectangle E2`` with it."""
     if test == "compliance":
         return name in TESTS[test].places
-    if where == name or where.startswith((f"{name} ", f"{name}-")) or where.endswith(f"-{name}"):
+    if place == name or place.startswith((f"{name} ", f"{name}-")) or place.endswith(f"-{name}"):
         return True
-    return test == "vAP" and name.startswith(f"{where} from ")
+    return test == "vAP" and name.startswith(f"{place} from ")
 
 
 _LENIENT = ConfigDict(extra="ignore", frozen=True)
@@ -246,16 +246,16 @@ def _no_result(path: Path, fault: Any) -> InputError:
     """Return the refusal of a file that is no result, in words of a person who gave another file."""
     entry = ".".join(map(str, fault["loc"]))
     if fault["type"] == "json_invalid":
-        came = "a text that is not JSON"
+        content = "a text that is not JSON"
     elif entry in ("", "truearm"):
         kind = fault["input"] if entry and isinstance(fault["input"], str) else None
-        came = "JSON of something else" if kind is None else f"a file of the kind {shortened(kind, 60)}"
+        content = "JSON of something else" if kind is None else f"a file of the kind {shortened(kind, 60)}"
     else:
-        came = f"a result {'without' if fault['type'] == 'missing' else 'with another kind of'} {entry}"
+        content = f"a result {'without' if fault['type'] == 'missing' else 'with another kind of'} {entry}"
     return InputError(
         "this is no result of tests by ISO 9283",
         where=str(path),
-        came=Words(came),
+        came=Words(content),
         allowed="the file iso9283.json that an evaluation has written",
         cure="Evaluate the other tests first, and give the iso9283.json of that folder.",
     )
@@ -296,9 +296,9 @@ class Course:
 Key = tuple[str, str, tuple[tuple[str, float | str], ...]]
 
 
-def key_of(id_: str, where: str, conditions: Mapping[str, float | str]) -> Key:
+def key_of(id_: str, place: str, conditions: Mapping[str, float | str]) -> Key:
     """Return the key of a curve, conditions as files have them."""
-    return id_, where, tuple(sorted(conditions.items()))
+    return id_, place, tuple(sorted(conditions.items()))
 
 
 @dataclass(frozen=True)
@@ -329,10 +329,10 @@ class Comparison:
         )
         for verdict in get_args(Verdict):
             rows = [row for row in self.rows if row.verdict == verdict]
-            told_apart = verdict in ("smaller", "larger")
+            significant = verdict in ("smaller", "larger")
             if rows:
-                yield say(f"  {verdict}{' by more than both intervals leave open' * told_apart}: {len(rows)}")
-            if told_apart:
+                yield say(f"  {verdict}{' by more than both intervals leave open' * significant}: {len(rows)}")
+            if significant:
                 shown = [row for row in rows if row.component == "position"] or rows
                 yield detail(*(f"    {row.id} {row.where}, {row.under}: {row.change}" for row in shown))
 
@@ -410,13 +410,13 @@ def compared(summary: dict[str, Any], other: Path) -> Comparison:
         if _unlike(first, second, offset.id, offset.where, offset.conditions) is None
     }
     drawn = (curves, offsets) if same_tie else ({}, {})
-    told = {why: tuple(ids) for why, ids in unlike.items()}
+    reasons = {why: tuple(ids) for why, ids in unlike.items()}
     called = f"{other} (simulated)" if second.simulated and not first.simulated else str(other)
-    return Comparison(called, tuple(rows), tuple(dict.fromkeys(left)), told, second.plan is None, *drawn)
+    return Comparison(called, tuple(rows), tuple(dict.fromkeys(left)), reasons, second.plan is None, *drawn)
 
 
 def _unlike(
-    first: ResultFile, second: ResultFile, id_: str, where: str, conditions: Mapping[str, float | str]
+    first: ResultFile, second: ResultFile, id_: str, place: str, conditions: Mapping[str, float | str]
 ) -> str | None:
     """Return why a value of the two was planned otherwise, None if it was not, or that is not told."""
     if id_ not in TEST_OF:
@@ -425,7 +425,7 @@ def _unlike(
     if first.rated is not None and second.rated is not None:
         why = unlike_rated(id_, conditions, first.rated, second.rated)
     if why is None and first.plan is not None and second.plan is not None:
-        why = unlike_plans(id_, where, first.plan, second.plan)
+        why = unlike_plans(id_, place, first.plan, second.plan)
     return why
 
 

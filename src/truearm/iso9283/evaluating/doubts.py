@@ -39,7 +39,7 @@ def refuse_other_rests(plan: PerformancePlan, curves: Sequence[SettlingCurve], s
         names = tuple(dict.fromkeys((*planned.places, *planned.approaches)))
         first = planned.places[0]
         name = curve.where.removeprefix(f"{first}-")
-        where = f"{source}, lines {curve.lines[0]} to {curve.lines[-1]}"
+        place = f"{source}, lines {curve.lines[0]} to {curve.lines[-1]}"
         end = curve.position[-_END:].mean(axis=0)
         own = float(np.linalg.norm(end - plan.poses[name].position))
         apart = {other: float(np.linalg.norm(end - plan.poses[other].position)) for other in names}
@@ -48,7 +48,7 @@ def refuse_other_rests(plan: PerformancePlan, curves: Sequence[SettlingCurve], s
             beside = f", {1e3 * apart[near]:.4g} mm from {near}" if near != name else ""
             raise InputError(
                 f"the tip comes to rest at another place than {name} in cycle {curve.cycle} of {curve.test}",
-                where=where,
+                where=place,
                 came=f"{1e3 * own:.4g} mm from {name}{beside}",
                 allowed=f"up to {1e3 * _allowed(plan):.4g} mm",
                 cure="Correct the name in the column pose, check the unit, and how the instrument is tied to the "
@@ -57,12 +57,12 @@ def refuse_other_rests(plan: PerformancePlan, curves: Sequence[SettlingCurve], s
         if curve.test != "posing-time" or name == first:
             continue
         way = float(np.linalg.norm(plan.poses[name].position - plan.poses[first].position))
-        made = float(np.linalg.norm(end - curve.position[:_END].mean(axis=0)))
-        if abs(made - way) > _OTHER_WAY + _OTHER_SHARE * way:
+        travelled = float(np.linalg.norm(end - curve.position[:_END].mean(axis=0)))
+        if abs(travelled - way) > _OTHER_WAY + _OTHER_SHARE * way:
             raise InputError(
                 f"the way to {name} in cycle {curve.cycle} of {curve.test} is not the planned one",
-                where=where,
-                came=f"{1e3 * made:.4g} mm",
+                where=place,
+                came=f"{1e3 * travelled:.4g} mm",
                 allowed=f"{1e3 * way:.4g} mm within {1e3 * (_OTHER_WAY + _OTHER_SHARE * way):.3g} mm",
                 cure=f"Record from rest in {first} on, and check the name in the column pose.",
             )
@@ -84,8 +84,8 @@ def refuse_other_push_place(plan: PerformancePlan, pushes: Pushes, position: Arr
     for direction in pushes.direction.names:
         rows = np.flatnonzero(pushes.direction.are(direction))
         for cycle in np.unique(pushes.cycle[rows]).tolist():
-            mine = rows[pushes.cycle[rows] == cycle]
-            row = int(mine[pushes.force[mine].argmin()])
+            rows_of_cycle = rows[pushes.cycle[rows] == cycle]
+            row = int(rows_of_cycle[pushes.force[rows_of_cycle].argmin()])
             away = float(np.linalg.norm(position[row] - plan.poses[name].position))
             if away > _allowed(plan):
                 raise InputError(
@@ -136,9 +136,9 @@ def other_cube(clouds: tuple[PoseCloud, ...], side: float) -> OtherCube | None:
         commanded, attained = (
             np.array([getattr(member, name) for member in members]) for name in ("command", "barycentre")
         )
-        found = _explained(commanded, attained - commanded, side)
-        if found is not None:
-            return OtherCube(str(test), *found)
+        explanation = _explained(commanded, attained - commanded, side)
+        if explanation is not None:
+            return OtherCube(str(test), *explanation)
     return None
 
 
@@ -218,21 +218,24 @@ def unusual_samples(
     away, usual = _apart_in_all(times, positions, stretches)
     less, compared = _without_common(positions, places, low, high, noise)
     other, usual_of_other = _apart_in_all(times, less, stretches, compared)
-    beyond = [one > np.maximum(_TIMES * there, there + _NOISE * noise) for one, there in zip(away, usual, strict=True)]
-    for cycle, (one, there) in enumerate(zip(other, usual_of_other, strict=True)):
-        least = np.maximum(_TIMES * there, there + _NOISE * noise)
-        beyond[cycle] |= one > np.maximum(least, _OF_WHOLE * usual[cycle])
+    beyond = [
+        distance > np.maximum(_TIMES * usual_distance, usual_distance + _NOISE * noise)
+        for distance, usual_distance in zip(away, usual, strict=True)
+    ]
+    for cycle, (far, level) in enumerate(zip(other, usual_of_other, strict=True)):
+        least = np.maximum(_TIMES * level, level + _NOISE * noise)
+        beyond[cycle] |= far > np.maximum(least, _OF_WHOLE * usual[cycle])
         if len(positions) < _FEW:
-            beyond[cycle] &= np.maximum(away[cycle], one) > _OF_TURN * _turns(positions[cycle])
-    found = []
+            beyond[cycle] &= np.maximum(away[cycle], far) > _OF_TURN * _turns(positions[cycle])
+    unusual = []
     for cycle, rows in enumerate(np.flatnonzero(mask) for mask in beyond):
         if not len(rows):
             continue
         size = np.maximum(away[cycle], other[cycle])
         for group in np.split(rows, np.flatnonzero(np.diff(rows) > _NEAR) + 1):
             worst = int(group[size[group].argmax()])
-            found.append(Unusual(cycle, worst, float(size[worst])))
-    return found
+            unusual.append(Unusual(cycle, worst, float(size[worst])))
+    return unusual
 
 
 def _stretches(places: Sequence[Array], low: float, high: float) -> list[NDArray[np.intp]]:
@@ -255,7 +258,7 @@ def _apart_in_all(
     """
     away = [_apart(time, value) for time, value in zip(times, values, strict=True)]
     if compared is not None:
-        away = [np.where(one, far, 0.0) for one, far in zip(compared, away, strict=True)]
+        away = [np.where(counted, far, 0.0) for counted, far in zip(compared, away, strict=True)]
     most = np.zeros((len(times), 2 + max(int(stretch.max()) for stretch in stretches)))
     for cycle, stretch in enumerate(stretches):
         np.maximum.at(most[cycle], stretch, away[cycle])

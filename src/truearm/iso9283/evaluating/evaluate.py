@@ -24,6 +24,7 @@ from truearm.engine.robot.chain import Array
 from truearm.iso9283.criteria.alignment import Alignment, read_alignment, refuse_implausible
 from truearm.iso9283.criteria.rows import Component, Conditions, Instrument, Value, copied_blocks
 from truearm.iso9283.evaluating.comparison import Comparison, ReadFile, compared, plan_summary
+from truearm.iso9283.evaluating.data_notices import drift_notices, push_notices, rounding_notices, stream_notices
 from truearm.iso9283.evaluating.evaluation import Evaluation, Measurements, evaluated
 from truearm.iso9283.evaluating.reading import read_attained_poses, read_pushes
 from truearm.iso9283.evaluating.samples import read_path_samples, read_settling_samples
@@ -37,7 +38,6 @@ from truearm.iso9283.evaluating.table import (
     row_notices,
     worst_places,
 )
-from truearm.iso9283.evaluating.told import said_of_drift, said_of_pushes, said_of_rounding, said_of_streams
 from truearm.iso9283.planning.criteria import PerformancePlan
 from truearm.iso9283.planning.plan_file import read_plan
 
@@ -78,7 +78,7 @@ class Iso9283Evaluation(Record):
             f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {counted_criteria(len(criteria))}.",
             truearm=SCHEMA,
             robot=self.plan.robot.name,
-            inputs={name: one.model_dump() for name, one in self.read.items()},
+            inputs={name: file.model_dump() for name, file in self.read.items()},
             rated={"load_kg": self.plan.rated_load, "velocity_mm_s": self.plan.rated_velocity * 1e3},
             plan=plan_summary(self.plan),
         )
@@ -138,13 +138,13 @@ class Iso9283Evaluation(Record):
     def tied(self) -> str:
         """How the instrument was tied to the robot's base, in words."""
         tie = self.evaluation.alignment
-        how = {
+        method = {
             "base-features": "measured features of the base",
             "controller-frame": "a frame of the controller",
             "best-fit": "a best fit of the attained poses to the commanded ones, which the standard does not allow",
         }[tie.kind]
         known = f", known to {tie.sigma * 1e3:.3f} mm and {math.degrees(tie.sigma_rot):.4f} deg" if tie.sigma else ""
-        return f"The instrument was tied to the robot's base by {how}{known}."
+        return f"The instrument was tied to the robot's base by {method}{known}."
 
     @property
     def written(self) -> tuple[str, ...]:
@@ -217,45 +217,45 @@ def evaluation(asked: EvaluateTests) -> Iso9283Evaluation:
         if tie is not None and read:
             _refuse_far_files(tie, planned.cube, read, str(tie_path))
         instrument = Instrument(asked.noise, asked.noise_rot)
-        found = evaluated(planned, Measurements(**read), tie, instrument, asked.progress)
+        evaluation_of_tests = evaluated(planned, Measurements(**read), tie, instrument, asked.progress)
         warnings = (
-            *_warnings(planned, found, read, instrument),
+            *_warnings(planned, evaluation_of_tests, read, instrument),
             *_of_plan(plan_path),
-            *said_of_pushes(planned, found.pushes, instrument),
-            *said_of_drift(planned, found.drift),
+            *push_notices(planned, evaluation_of_tests.pushes, instrument),
+            *drift_notices(planned, evaluation_of_tests.drift),
         )
-        made = Iso9283Evaluation(planned, found, instrument, None, asked.again, warnings, inputs)
+        result = Iso9283Evaluation(planned, evaluation_of_tests, instrument, None, asked.again, warnings, inputs)
         if other is not None:
             with refusals_of("compare"):
-                made = replace(made, comparison=compared(made.summary(), other))
-            made = replace(made, warnings=(*made.warnings, *_warnings_of_comparison(made)))
+                result = replace(result, comparison=compared(result.summary(), other))
+            result = replace(result, warnings=(*result.warnings, *_warnings_of_comparison(result)))
     named = {"plan": plan_path, **files, "alignment": tie_path, "compare": other}
-    made = replace(made, read=_read_files(named, noted))
+    result = replace(result, read=_read_files(named, noted))
     if folder is not None:
         asked.progress("writing the report")
-        made.save(folder)
-    return made
+        result.save(folder)
+    return result
 
 
-def _path(given: str | Path | None) -> Path | None:
-    return None if given is None else Path(given)
+def _path(path: str | Path | None) -> Path | None:
+    return None if path is None else Path(path)
 
 
 def _read_files(named: Mapping[str, Path | None], noted: Mapping[Path, Sequence[str]]) -> dict[str, ReadFile]:
     """Return the files that were read, by their parameters; the one beside the plan that nobody named is the robot."""
-    given = {name: path for name, path in named.items() if path is not None}
-    beside = next(path.name for path in noted if path not in {one.absolute() for one in given.values()})
-    given["robot"] = given["plan"].parent / beside
-    return {name: ReadFile(file=str(path), sha256=noted[path.absolute()][0]) for name, path in given.items()}
+    paths = {name: path for name, path in named.items() if path is not None}
+    beside = next(path.name for path in noted if path not in {named_path.absolute() for named_path in paths.values()})
+    paths["robot"] = paths["plan"].parent / beside
+    return {name: ReadFile(file=str(path), sha256=noted[path.absolute()][0]) for name, path in paths.items()}
 
 
-def _refuse_far_files(tie: Alignment, cube: Cube, read: Mapping[str, Any], where: str) -> None:
+def _refuse_far_files(tie: Alignment, cube: Cube, read: Mapping[str, Any], place: str) -> None:
     """Refuse a tie with which every file lies far from the cube, and a file that alone does so."""
     far: dict[str, InputError] = {}
-    for name, one in read.items():
+    for name, readings in read.items():
         try:
             with refusals_of("alignment"):
-                refuse_implausible(tie, cube, one.position, where)
+                refuse_implausible(tie, cube, readings.position, place)
         except InputError as refusal:
             far[name] = refusal
     if not far:
@@ -297,23 +297,23 @@ INSTRUMENT_TOO_COARSE: Final = Rule(
 
 
 def _warnings(
-    plan: PerformancePlan, found: Evaluation, read: Mapping[str, Any], instrument: Instrument
+    plan: PerformancePlan, evaluation_of_tests: Evaluation, read: Mapping[str, Any], instrument: Instrument
 ) -> tuple[Notice, ...]:
     notices: list[Notice] = []
-    if not found.alignment.is_standard:
+    if not evaluation_of_tests.alignment.is_standard:
         notices.append(
             BEST_FIT_ALIGNMENT(
                 "The frame of the instrument was fitted to the attained poses. That hides a part of the error that "
                 "pose and path accuracy shall tell, and is not what the standard asks for: AP and AT are too small."
             )
         )
-    notices += row_notices(found)
+    notices += row_notices(evaluation_of_tests)
     copied = [block for name in ("paths", "settling") if name in read for block in copied_blocks(read[name])]
     notices += copied_notices(copied)
-    notices += cycle_notices(plan, found)
-    notices += cube_notices(plan, found)
+    notices += cycle_notices(plan, evaluation_of_tests)
+    notices += cube_notices(plan, evaluation_of_tests)
     coarse: dict[str, list[str]] = {}
-    for value in found.values:
+    for value in evaluation_of_tests.values:
         if value.status == "instrument-too-coarse" and value.component not in coarse.setdefault(value.id, []):
             coarse[value.id].append(value.component)
     if coarse:
@@ -327,7 +327,7 @@ def _warnings(
                 "They say more about the measurement than about the robot."
             )
         )
-    return (*notices, *said_of_streams(found), *said_of_rounding(found, instrument))
+    return (*notices, *stream_notices(evaluation_of_tests), *rounding_notices(evaluation_of_tests, instrument))
 
 
 PLAN_CHANGED: Final = Rule(
@@ -369,8 +369,8 @@ PLAN_UNKNOWN: Final = Rule(
 )
 
 
-def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
-    beside = made.comparison
+def _warnings_of_comparison(result: Iso9283Evaluation) -> tuple[Notice, ...]:
+    beside = result.comparison
     if beside is None:
         return ()
     notices = []
@@ -382,8 +382,8 @@ def _warnings_of_comparison(made: Iso9283Evaluation) -> tuple[Notice, ...]:
             )
         )
     if beside.unlike:
-        told = "; ".join(f"{', '.join(ids)}: {why}" for why, ids in beside.unlike.items())
-        notices.append(PLAN_DIFFERS(f"Values that are not alike are not compared. {told}."))
+        reasons = "; ".join(f"{', '.join(ids)}: {why}" for why, ids in beside.unlike.items())
+        notices.append(PLAN_DIFFERS(f"Values that are not alike are not compared. {reasons}."))
     if beside.unknown_plan:
         notices.append(
             PLAN_UNKNOWN(

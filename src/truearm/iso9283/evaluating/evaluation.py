@@ -57,7 +57,10 @@ class Measurements:
     @property
     def simulated(self) -> bool:
         """Whether a virtual instrument read any of them."""
-        return any(one is not None and one.simulated for one in (self.poses, self.paths, self.settling, self.forces))
+        return any(
+            readings is not None and readings.simulated
+            for readings in (self.poses, self.paths, self.settling, self.forces)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,71 +129,76 @@ def evaluated(
     transform: Array = homogeneous(place.rotation[None], np.array(place.translation)[None])[0]
     readings = _readings(measured, instrument)
     values: list[Value] = []
-    made = Evaluation((), alignment, readings=readings, simulated=measured.simulated)
+    evaluation = Evaluation((), alignment, readings=readings, simulated=measured.simulated)
     if poses is not None:
         progress("poses")
         of_poses = evaluate(plan, poses, alignment, readings["poses"])
         values += of_poses.values
-        made = replace(made, clouds=of_poses.clouds, drift=of_poses.drift, unusual=of_poses.unusual)
-        made = replace(made, missing=of_poses.missing)
+        evaluation = replace(evaluation, clouds=of_poses.clouds, drift=of_poses.drift, unusual=of_poses.unusual)
+        evaluation = replace(evaluation, missing=of_poses.missing)
     if paths is not None:
         reading = readings["paths"]
         tie = np.sqrt(np.diag(alignment.covariance_at(plan.cube.centre)))
         deviations: list[PathDeviations] = []
         for test in ("AT", "AT-reorientation"):
             progress(TESTS[test].name)
-            found, courses = path_values(plan, paths, transform, reading, test, tie, alignment.sigma_rot)
-            values += found
+            test_values, courses = path_values(plan, paths, transform, reading, test, tie, alignment.sigma_rot)
+            values += test_values
             deviations += courses
         curves: dict[str, Any] = {}
         for test, (name, values_of) in _ALONG_PATHS.items():
             progress(TESTS[test].name)
-            found, of_test = values_of(plan, paths, transform, reading)
-            values += found
+            test_values, of_test = values_of(plan, paths, transform, reading)
+            values += test_values
             curves[name] = tuple(of_test)
-        made = replace(made, deviations=tuple(deviations), **curves)
+        evaluation = replace(evaluation, deviations=tuple(deviations), **curves)
     if measured.settling is not None:
         progress(TESTS["t"].name)
-        found, settling = settling_values(plan, measured.settling, transform, readings["settling"])
+        test_values, settling = settling_values(plan, measured.settling, transform, readings["settling"])
         refuse_other_rests(plan, settling, measured.settling.source)
-        values += found
-        made = replace(made, settling=tuple(settling))
+        values += test_values
+        evaluation = replace(evaluation, settling=tuple(settling))
     if measured.forces is not None:
         progress(TESTS["compliance"].name)
         refuse_other_push_place(plan, measured.forces, alignment.in_base(measured.forces.position))
         stiff, pushes = evaluate_pushes(plan, measured.forces, alignment, readings["forces"])
         values += stiff
-        made = replace(made, pushes=pushes, outlying_pushes=outlying_pushes(pushes, readings["forces"]))
+        evaluation = replace(evaluation, pushes=pushes, outlying_pushes=outlying_pushes(pushes, readings["forces"]))
     absent = missing_places(plan, values)
     values += _not_measured(plan, values, absent)
     return replace(
-        made,
+        evaluation,
         values=tuple(sorted(values, key=lambda value: CRITERIA.index(value.id))),
-        missing=(*made.missing, *dict.fromkeys(one.words for one in absent)),
+        missing=(*evaluation.missing, *dict.fromkeys(missing_place.words for missing_place in absent)),
     )
 
 
 def _readings(measured: Measurements, instrument: Instrument) -> dict[str, Instrument]:
     """Return the instrument as its readings stand in each file, by the names of the files."""
-    made = {}
+    instruments = {}
     if measured.poses is not None:
-        made["poses"] = instrument.reading(measured.poses.resolution, measured.poses.resolution_rot)
-    rest = {"paths": measured.paths, "settling": measured.settling, "forces": measured.forces}
-    return made | {name: instrument.reading(one.resolution) for name, one in rest.items() if one is not None}
+        instruments["poses"] = instrument.reading(measured.poses.resolution, measured.poses.resolution_rot)
+    sampled = {"paths": measured.paths, "settling": measured.settling, "forces": measured.forces}
+    return instruments | {
+        name: instrument.reading(samples.resolution) for name, samples in sampled.items() if samples is not None
+    }
 
 
 def _not_measured(plan: PerformancePlan, values: Sequence[Value], absent: Sequence[MissingPlace]) -> list[Value]:
     """Return a value for each that was planned and not measured, at single places and of whole tests."""
-    there = {(value.id, value.where, value.conditions) for value in values}
-    places = [(id_, one.where, one.conditions) for one in absent for id_ in TESTS[one.test].criteria]
-    made = [_nothing(*place) for place in places if place not in there]
-    known = {value.id for value in (*values, *made)}
+    measured = {(value.id, value.where, value.conditions) for value in values}
+    places = [(id_, place.where, place.conditions) for place in absent for id_ in TESTS[place.test].criteria]
+    not_measured = [_nothing(*place) for place in places if place not in measured]
+    known = {value.id for value in (*values, *not_measured)}
     for planned in plan.tests:
-        where, left_out = ", ".join(planned.places), [one for one in TESTS[planned.id].criteria if one not in known]
-        made += [_nothing(criterion, where, Conditions()) for criterion in left_out]
-    return made
+        all_places, left_out = (
+            ", ".join(planned.places),
+            [criterion for criterion in TESTS[planned.id].criteria if criterion not in known],
+        )
+        not_measured += [_nothing(criterion, all_places, Conditions()) for criterion in left_out]
+    return not_measured
 
 
-def _nothing(criterion: str, where: str, conditions: Conditions) -> Value:
+def _nothing(criterion: str, place: str, conditions: Conditions) -> Value:
     quantity = _QUANTITIES.get(criterion, "length")
-    return Value(criterion, "position", where, float("nan"), quantity, None, 0, conditions, "not-measured")
+    return Value(criterion, "position", place, float("nan"), quantity, None, 0, conditions, "not-measured")

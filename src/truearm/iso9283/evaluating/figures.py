@@ -50,8 +50,8 @@ def fastest(things: Sequence[PoseCloud]) -> list[PoseCloud]:
     """Return those at the fastest velocity and the largest load."""
     velocity = max((thing.velocity for thing in things), default=0.0)
     of_it = [thing for thing in things if thing.velocity == velocity]
-    load = max((one.load for one in of_it), default=0.0)
-    return [one for one in of_it if one.load == load]
+    load = max((thing.load for thing in of_it), default=0.0)
+    return [thing for thing in of_it if thing.load == load]
 
 
 def thinned(count: int, most: int = _MOST_SAMPLES) -> np.ndarray:
@@ -88,7 +88,7 @@ def pose_pictures(
     drawings: list[Section] = []
     accuracy = fastest([cloud for cloud in clouds if cloud.test == "AP"])
     # Of several robots the first: the picture is of one.
-    accuracy = sorted((one for one in accuracy if one.robot == accuracy[0].robot), key=lambda one: one.pose)
+    accuracy = sorted((cloud for cloud in accuracy if cloud.robot == accuracy[0].robot), key=lambda cloud: cloud.pose)
     if accuracy:
         under = _under(accuracy[0])
         drawings.append(
@@ -107,21 +107,21 @@ def pose_pictures(
             "approaches",
             "Attained poses by approach",
             "vAP is the largest distance between two barycentres, the large marks. The middle of them is 0.",
-            lambda found: _together(found, lambda one: f"from {one.approach}"),
+            lambda shown: _together(shown, lambda cloud: f"from {cloud.approach}"),
         ),
         (
             of_test["E"],
             "robots",
             "Attained poses by robot",
             "E is the largest distance between two barycentres, the large marks. The middle of them is 0.",
-            lambda found: _together(found, lambda one: one.robot),
+            lambda shown: _together(shown, lambda cloud: cloud.robot),
         ),
         (
             [course for course in drift if len(course.ap) > 1],
             "drift",
             "Drift from cold",
             "Change of AP and RP against the first value; dAP and dRP are the largest.",
-            lambda found: _drift(found[0]),
+            lambda shown: _drift(shown[0]),
         ),
         (
             [curve for curve in settling if curve.test == "t"],
@@ -147,7 +147,7 @@ def pose_pictures(
             _pushes,
         ),
     ]
-    return drawings + [pictured(name, title, words, draw(found)) for found, name, title, words, draw in others if found]
+    return drawings + [pictured(name, title, words, draw(shown)) for shown, name, title, words, draw in others if shown]
 
 
 def _under(cloud: PoseCloud) -> str:
@@ -172,13 +172,13 @@ def _clouds(clouds: Sequence[PoseCloud]) -> Figure:
 
 def _offsets(clouds: Sequence[PoseCloud], other: Comparison | None) -> Array:
     """Return how far the barycentres of another result are from their commands [m], NaN where it has none."""
-    found = np.full((len(clouds), 3), np.nan)
+    offsets = np.full((len(clouds), 3), np.nan)
     for row, cloud in enumerate(clouds) if other is not None else ():
         under = conditions_summary(Conditions(cloud.velocity, cloud.load, cloud.robot))
         offset = other.offsets.get(key_of(cloud.test, cloud.pose, under)) if other is not None else None
         if offset is not None:
-            found[row] = 1e-3 * np.array(offset)
-    return found
+            offsets[row] = 1e-3 * np.array(offset)
+    return offsets
 
 
 def _accuracy(plan: PerformancePlan, clouds: Sequence[PoseCloud], under: str, other: Comparison | None) -> Section:
@@ -353,7 +353,7 @@ def _pushes(pushes: Sequence[PushLine]) -> Figure:
     drawn = []
     for direction in dict.fromkeys(push.direction for push in pushes):
         traces = []
-        for number, push in enumerate(one for one in pushes if one.direction == direction):
+        for number, push in enumerate(curve for curve in pushes if curve.direction == direction):
             colour = HUES[number % len(HUES)]
             ends = np.array([0.0, push.force.max()])
             traces.append(dots(f"cycle {push.cycle}", push.force, push.displacement * 1e6, colour, 5))

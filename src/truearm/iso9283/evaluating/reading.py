@@ -66,7 +66,7 @@ def read_attained_poses(path: Path) -> AttainedPoses:
     if "time" in columns:
         time = cells.numbers(*columns["time"], missing=True)
     names = (criterion, robot, pose, approach)
-    group = _groups(*(one.code for one in names), velocity, load)
+    group = _groups(*(column.code for column in names), velocity, load)
     rotation, resolution_rot = None, 0.0
     if "qw" in columns:
         parts = np.column_stack([cells.numbers(*columns[part]) for part in _QUATERNION])
@@ -155,29 +155,29 @@ def _positions(cells: Cells, columns: Columns) -> Array:
 def _cycles(cells: Cells, columns: Columns) -> NDArray[np.intp]:
     cycle = cells.numbers(columns["cycle"][0], "1")
     wrong = (cycle < 1) | (cycle > _LARGEST_CYCLE) | (cycle != np.round(cycle))
-    what, allowed = "a cycle is a whole number from 1", "1, 2, 3 and so on"
-    _refuse_first(cells, columns, "cycle", wrong, what, allowed, "Number the cycles from 1.")
+    message, allowed = "a cycle is a whole number from 1", "1, 2, 3 and so on"
+    _refuse_first(cells, columns, "cycle", wrong, message, allowed, "Number the cycles from 1.")
     return cycle.astype(np.intp)
 
 
-def _share(cells: Cells, columns: Columns, name: str, what: str) -> Array:
+def _share(cells: Cells, columns: Columns, name: str, message: str) -> Array:
     percent = cells.numbers(columns[name][0], "1")
     lowest_too = name == "velocity"
     wrong = (percent > 100.0) | (percent < 0.0) | ((percent == 0.0) & lowest_too)
     allowed = f"{'above 0' if lowest_too else '0'} to 100 %"
     _refuse_first(
-        cells, columns, name, wrong, what, allowed, "Tests go up to the rated one: correct or remove the row."
+        cells, columns, name, wrong, message, allowed, "Tests go up to the rated one: correct or remove the row."
     )
     return percent / 100.0
 
 
 def _refuse_first(
-    cells: Cells, columns: Columns, name: str, wrong: NDArray[np.bool_], what: str, allowed: str, cure: str
+    cells: Cells, columns: Columns, name: str, wrong: NDArray[np.bool_], message: str, allowed: str, cure: str
 ) -> None:
     if wrong.any():
         row, place = int(np.argmax(wrong)), columns[name][0]
         raise InputError(
-            what, where=cells.place(row, place), came=cells.columns[place][row], allowed=allowed, cure=cure
+            message, where=cells.place(row, place), came=cells.columns[place][row], allowed=allowed, cure=cure
         )
 
 

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 
 #: A corner is drawn so many times the largest of its deviations about it.
-_ROOM: Final = 4.0
+_MARGIN: Final = 4.0
 #: So many whole waves of a weave are drawn.
 _WAVES: Final = 5
 _STREAM_SAMPLES: Final = 1500
@@ -62,7 +62,7 @@ _BAND: Final = "#c3d5e3"
 _Curves = TypeVar("_Curves", PathDeviations, CornerCurves, VelocityCurves, WeaveCurves)
 
 
-def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Section]:
+def path_pictures(evaluation: Evaluation, other: Comparison | None = None) -> list[Section]:
     """Return the pictures of what was measured along paths, those at the fastest velocity of each test.
 
     Args:
@@ -73,7 +73,7 @@ def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Se
         ("AT", "paths", "Deviation along the paths"),
         ("AT-reorientation", "paths-reoriented", "Deviation along the path on reorientation"),
     ):
-        courses = _fastest([deviation for deviation in found.deviations if deviation.run.test == test])
+        courses = _fastest([deviation for deviation in evaluation.deviations if deviation.run.test == test])
         if courses:
             words = (
                 f"Distance from the command in planes at right angles to it, {_under(courses[0].run)}. "
@@ -83,22 +83,22 @@ def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Se
             if any(beside):
                 words += " Dashed: the barycentre of the other result."
             drawings.append(pictured(name, title, words, _deviations(courses, beside)))
-    corners = _fastest(found.corners)
+    corners = _fastest(evaluation.corners)
     if corners:
         words = (
             f"In the plane of the two sides, {_under(corners[0].run)}. The commanded path comes from the left and goes "
             "on upwards. CR is the least distance to the corner, CO how far the tip goes beyond the second side."
         )
         drawings.append(pictured("corners", "Corners", words, _corners(corners)))
-    velocities = _fastest(found.velocities)
+    velocities = _fastest(evaluation.velocities)
     if velocities:
         words = f"Each cycle, {_under(velocities[0].run)}. AV, RV and FV are read in the grey middle half."
         drawings.append(pictured("velocity", "Velocity along the path", words, _velocity(velocities)))
-    weaves = _fastest(found.weaves)
+    weaves = _fastest(evaluation.weaves)
     if weaves:
         words = f"The first {_WAVES} waves of the first cycle beside the command, {_under(weaves[0].run)}."
         drawings.append(pictured("weave", "Weave", words, _weave(weaves[0])))
-    streams = [run.found for run in _runs(found) if run.found is not None]
+    streams = [run.stream for run in _runs(evaluation) if run.stream is not None]
     if streams:
         words = (
             "Speed of the tip in streams whose cycles are not numbered. Cycles found are blue, dwells grey; above "
@@ -108,12 +108,12 @@ def path_pictures(found: Evaluation, other: Comparison | None = None) -> list[Se
     return drawings
 
 
-def _runs(found: Evaluation) -> list[Run]:
+def _runs(evaluation: Evaluation) -> list[Run]:
     runs = [
-        *(deviation.run for deviation in found.deviations),
-        *(corner.run for corner in found.corners),
-        *(velocity.run for velocity in found.velocities),
-        *(weave.run for weave in found.weaves),
+        *(deviation.run for deviation in evaluation.deviations),
+        *(corner.run for corner in evaluation.corners),
+        *(velocity.run for velocity in evaluation.velocities),
+        *(weave.run for weave in evaluation.weaves),
     ]
     return list({id(run): run for run in runs}.values())
 
@@ -121,8 +121,8 @@ def _runs(found: Evaluation) -> list[Run]:
 def _fastest(curves: Sequence[_Curves]) -> list[_Curves]:
     """Return those at the fastest velocity and the largest load."""
 
-    def of(one: _Curves) -> tuple[float, float]:
-        return one.run.conditions.velocity or 0.0, one.run.conditions.load or 0.0
+    def of(curve: _Curves) -> tuple[float, float]:
+        return curve.run.conditions.velocity or 0.0, curve.run.conditions.load or 0.0
 
     most = max(map(of, curves), default=(0.0, 0.0))
     return [curve for curve in curves if of(curve) == most]
@@ -164,18 +164,18 @@ def _deviations(courses: Sequence[PathDeviations], others: Sequence[Course | Non
 def _corners(corners: Sequence[CornerCurves]) -> Figure:
     drawn = []
     for corner in corners:
-        room = _ROOM * 1e3 * float(max(corner.rounding.max(), corner.overshoot.max(), 1e-4))
-        command = np.array([[-room, 0.0], [0.0, 0.0], [0.0, room]])
+        half_width = _MARGIN * 1e3 * float(max(corner.rounding.max(), corner.overshoot.max(), 1e-4))
+        command = np.array([[-half_width, 0.0], [0.0, 0.0], [0.0, half_width]])
         traces = [line("command", command[:, 0], command[:, 1], INK, 1.5)]
         for number, points in enumerate(corner.attained):
             away = (points - corner.corner) * 1e3
             at = np.stack([away @ corner.before, away @ corner.after], axis=1)
-            at = at[(np.abs(at) <= room).all(axis=1)]
+            at = at[(np.abs(at) <= half_width).all(axis=1)]
             at = at[thinned(len(at))] if len(at) else at
             traces.append(line(f"cycle {number + 1}", at[:, 0], at[:, 1], HUES[number % len(HUES)], 1.5))
-        rounding, overshoot = (1e3 * float(one.mean()) for one in (corner.rounding, corner.overshoot))
+        rounding, overshoot = (1e3 * float(lengths.mean()) for lengths in (corner.rounding, corner.overshoot))
         title = f"{html.escape(corner.where)}: CR {rounding:.3f}, CO {overshoot:.3f} mm"
-        limits = {"range": [-room, room]}
+        limits = {"range": [-half_width, half_width]}
         drawn.append(
             Panel(title, traces, "way before [mm]", "way after [mm]", equal=True, more_x=limits, more_y=limits)
         )
@@ -257,23 +257,23 @@ _AXES: tuple[Component, ...] = ("x", "y", "z")
 _ANGLES: tuple[Component, ...] = ("a", "b", "c")
 
 
-def iso9283_report(found: Iso9283Evaluation) -> str:
+def iso9283_report(result: Iso9283Evaluation) -> str:
     """Return the report: the criteria at their worst places, pictures, and every value."""
-    measured = [value for value in found.values if value.status != "not-measured"]
-    worst = tuple(tuple(map(_unbroken, place.cells)) for place in worst_places(found.values))
+    measured = [value for value in result.values if value.status != "not-measured"]
+    worst = tuple(tuple(map(_unbroken, place.cells)) for place in worst_places(result.values))
     tables = [tabled("Criteria at their worst places", HEADING, worst, texts=(1, 4, 5))]
-    if found.comparison is not None:
-        tables.append(_compared(found.comparison))
+    if result.comparison is not None:
+        tables.append(_compared(result.comparison))
     details: list[Section] = []
-    for name in dict.fromkeys(test_name(value) for value in found.values):
-        details += _tables(name, [value for value in found.values if test_name(value) == name])
-    evaluation = found.evaluation
-    plan = found.plan
+    for name in dict.fromkeys(test_name(value) for value in result.values):
+        details += _tables(name, [value for value in result.values if test_name(value) == name])
+    evaluation = result.evaluation
+    plan = result.plan
     unread = [test for test in plan.tests if not any(value.id in TESTS[test.id].criteria for value in measured)]
     words = [
-        found.tied,
+        result.tied,
         f"Rated: {plan.rated_load:g} kg, {plan.rated_velocity * 1e3:g} mm/s along a path. A reading of the instrument "
-        f"has a standard deviation of {found.instrument.sigma * 1e3:g} mm.",
+        f"has a standard deviation of {result.instrument.sigma * 1e3:g} mm.",
         "Intervals are of 95 %. Criteria of three cycles have their range instead. Of several velocities the fastest "
         "is in the first table and in the pictures.",
         "Evaluated by what the literature says of ISO 9283:1998. Who wants to claim conformity needs the standard's "
@@ -284,17 +284,17 @@ def iso9283_report(found: Iso9283Evaluation) -> str:
     return Document(
         f"{plan.robot.title} by the criteria of ISO 9283",
         [
-            answer(words, found.warnings),
+            answer(words, result.warnings),
             *tables,
             *pose_pictures(
-                plan, evaluation.clouds, evaluation.drift, evaluation.settling, evaluation.pushes, found.comparison
+                plan, evaluation.clouds, evaluation.drift, evaluation.settling, evaluation.pushes, result.comparison
             ),
-            *path_pictures(evaluation, found.comparison),
+            *path_pictures(evaluation, result.comparison),
             *details,
         ],
-        found.command,
+        result.command,
         subtitle="Pose and path characteristics with their intervals.",
-    ).html(found)
+    ).html(result)
 
 
 def _unbroken(cell: str) -> str:
@@ -319,13 +319,13 @@ def _tables(name: str, values: Sequence[Value]) -> list[Section]:
         if value.component == "position"
     )
     heading = ("Criterion", "Where", "Velocity, load", "Value", "95 %, or range", "Cycles", "Status")
-    made = [tabled(title, heading, rows)]
+    tables = [tabled(title, heading, rows)]
     for parts, words, unit in ((_AXES, "single axes", "mm"), (_ANGLES, "angles", "deg")):
         detail = _details([value for value in values if value.component in parts], parts)
         if detail:
             columns = tuple(f"{part} [{unit}]" for part in parts)
-            made.append(tabled(f"{title}: {words}", ("Criterion", "Where", "Velocity, load", *columns), detail))
-    return made
+            tables.append(tabled(f"{title}: {words}", ("Criterion", "Where", "Velocity, load", *columns), detail))
+    return tables
 
 
 def _details(values: Sequence[Value], parts: Sequence[Component]) -> tuple[tuple[str, ...], ...]:

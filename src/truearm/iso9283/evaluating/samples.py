@@ -167,25 +167,25 @@ def _columns(headings: Sequence[str], header: str, place: Place) -> dict[str, tu
     columns: dict[str, tuple[int, str]] = {}
     known[SIMULATED] = SIMULATED
     for number, heading in enumerate(headings):
-        where = f"{header}, column {number + 1}"
+        location = f"{header}, column {number + 1}"
         match = _HEADING.fullmatch(heading)
         name, unit = (match["name"], match["unit"]) if match else (heading, None)
         if name not in known:
             near = nearest_names(name, known, 1, 0.6)
             raise InputError(
                 "the column is not known" if heading else "the column has no name",
-                where=where,
+                where=location,
                 came=heading or None,
                 allowed=allowed,
                 cure=f"Did you mean {known[near[0]]}?" if near else "Rename it, or leave it out.",
             )
         if name in columns:
-            raise InputError(f"the column {name} appears twice", where=where, cure="Remove one of them.")
+            raise InputError(f"the column {name} appears twice", where=location, cure="Remove one of them.")
         if name in _UNITS:
-            unit = checked_unit(unit, _UNITS[name], f"{where}, {heading}")
+            unit = checked_unit(unit, _UNITS[name], f"{location}, {heading}")
         elif unit is not None:
             raise InputError(
-                "this column takes no unit", where=where, came=heading, allowed=name, cure="Remove the unit."
+                "this column takes no unit", where=location, came=heading, allowed=name, cure="Remove the unit."
             )
         columns[name] = (number, unit or "1")
     for name in (*needed, *(_QUATERNION if any(part in columns for part in _QUATERNION) else ())):
@@ -210,8 +210,8 @@ def _blocks(content: bytes, start: int, header: _Header) -> Iterator[tuple[NDArr
         numbers = np.arange(line, line + len(texts))
         line += len(texts)
         if any(not text or text.isspace() for text in texts):
-            kept = np.array([bool(text.strip()) for text in texts])
-            texts, numbers = [text for text in texts if text.strip()], numbers[kept]
+            filled = np.array([bool(text.strip()) for text in texts])
+            texts, numbers = [text for text in texts if text.strip()], numbers[filled]
         if texts:
             yield numbers, texts
 
@@ -333,12 +333,12 @@ def _numbers(texts: list[str], lines: NDArray[np.intp], header: _Header) -> Arra
     """Return the columns of numbers in the units of the file, ``(rows, columns)``."""
     places = [header.columns[name][0] for name in header.numbers]
     try:
-        made = np.loadtxt(texts, delimiter=",", usecols=places, comments=None, quotechar='"', ndmin=2)
-        if len(made) == len(texts) and (np.abs(made) <= _LARGEST * 1e6).all():
-            return made
+        numbers = np.loadtxt(texts, delimiter=",", usecols=places, comments=None, quotechar='"', ndmin=2)
+        if len(numbers) == len(texts) and (np.abs(numbers) <= _LARGEST * 1e6).all():
+            return numbers
     except ValueError:
         pass
-    made = np.empty((len(texts), len(places)))
+    numbers = np.empty((len(texts), len(places)))
     for row, text in enumerate(texts):
         cells = _cells(text, int(lines[row]), header)
         for column, (name, place) in enumerate(zip(header.numbers, places, strict=True)):
@@ -351,8 +351,8 @@ def _numbers(texts: list[str], lines: NDArray[np.intp], header: _Header) -> Arra
                     allowed="a finite number with a decimal point",
                     cure="Leave out a sample of which a part was not read.",
                 )
-            made[row, column] = number
-    return made
+            numbers[row, column] = number
+    return numbers
 
 
 def _samples(

@@ -46,16 +46,16 @@ class Worst:
     def cells(self) -> tuple[str, ...]:
         """The cells of its row: criterion, place, value, interval, other velocities, status."""
         value = self.value
-        where = value.where
-        if self.places > 1 and where != _ALL_PLACES:
-            where = f"{where}, worst of {self.places}"
+        place = value.where
+        if self.places > 1 and place != _ALL_PLACES:
+            place = f"{place}, worst of {self.places}"
             if self.missing:
-                where += f" of {self.places + len(self.missing)}"
+                place += f" of {self.places + len(self.missing)}"
         besides = [f"{velocity_words(other.conditions)}: {number_words(other)}" for other in self.others]
         name = f"{value.id} {value.conditions.robot}".rstrip()
         load = value.conditions.load
         if load is not None and load < 1.0:
-            where = f"{where}, load {100 * load:g} %"
+            place = f"{place}, load {100 * load:g} %"
         status = [str(value.status)] if value.status != "measured" else []
         if self.missing:
             status.append(f"not-measured: {', '.join(self.missing)}")
@@ -63,7 +63,7 @@ class Worst:
             status.append(f"not-measured: {100 * self.faster:g} %")
         return (
             name,
-            where,
+            place,
             f"{number_words(value)} {UNITS[value.quantity][0]}",
             beside_words(value),
             ", ".join(besides),
@@ -79,19 +79,21 @@ def worst_places(values: Sequence[Value]) -> list[Worst]:
             under = value.conditions
             by_velocity = groups.setdefault((value.id, under.load, under.robot), {})
             by_velocity.setdefault(under.velocity or 0.0, []).append(value)
-    found = []
+    worst = []
     for by_velocity in groups.values():
         planned = sorted(by_velocity, reverse=True)
-        there = {velocity: [one for one in by_velocity[velocity] if math.isfinite(one.value)] for velocity in planned}
-        measured = [velocity for velocity in planned if there[velocity]]
+        measured_at = {
+            velocity: [entry for entry in by_velocity[velocity] if math.isfinite(entry.value)] for velocity in planned
+        }
+        measured = [velocity for velocity in planned if measured_at[velocity]]
         if not measured:
             continue
-        fastest, *others = (there[velocity] for velocity in measured)
+        fastest, *others = (measured_at[velocity] for velocity in measured)
         places = len([value for value in fastest if value.where != _ALL_PLACES])
-        missing = [one.where for one in by_velocity[measured[0]] if math.isnan(one.value)]
+        missing = [entry.where for entry in by_velocity[measured[0]] if math.isnan(entry.value)]
         faster = planned[0] if planned[0] != measured[0] else None
-        found.append(Worst(_worst(fastest), places, tuple(map(_worst, others)), tuple(missing), faster))
-    return sorted(found, key=lambda one: CRITERIA.index(one.value.id))
+        worst.append(Worst(_worst(fastest), places, tuple(map(_worst, others)), tuple(missing), faster))
+    return sorted(worst, key=lambda row: CRITERIA.index(row.value.id))
 
 
 def _worst(values: Sequence[Value]) -> Value:
@@ -131,12 +133,12 @@ def conditions_words(value: Value) -> str:
 
 def conditions_summary(under: Conditions) -> dict[str, float | str]:
     """Return conditions as JSON holds them."""
-    found: dict[str, float | str] = {}
+    summary: dict[str, float | str] = {}
     if under.velocity is not None:
-        found["velocity_percent"] = round(100.0 * under.velocity, 6)
+        summary["velocity_percent"] = round(100.0 * under.velocity, 6)
     if under.load is not None:
-        found["load_percent"] = round(100.0 * under.load, 6)
-    return {**found, "robot": under.robot} if under.robot else found
+        summary["load_percent"] = round(100.0 * under.load, 6)
+    return {**summary, "robot": under.robot} if under.robot else summary
 
 
 def values_of(result: ResultFile) -> tuple[Value, ...]:
@@ -194,8 +196,8 @@ def _number(number: float, quantity: Quantity) -> str:
 
 
 #: So many rows, poses and places are told one by one.
-_TOLD: Final = 3
-_TOLD_PLACES: Final = 8
+_NAMED_ROWS: Final = 3
+_NAMED_PLACES: Final = 8
 #: So many values are told with and without a row.
 _VALUES: Final = 2
 #: Criteria of which each cycle of a place counts once.
@@ -245,41 +247,41 @@ PLACES_MISSING: Final = Rule(
 )
 
 
-def row_notices(found: Evaluation) -> tuple[Notice, ...]:
+def row_notices(evaluation: Evaluation) -> tuple[Notice, ...]:
     """Return what is to be known about the rows of an evaluation."""
     notices = []
-    outlying, places = found.unusual.outlying, found.unusual.two_places
+    outlying, places = evaluation.unusual.outlying, evaluation.unusual.two_places
     if outlying:
-        told = " ".join(_outlying_words(row, "it" if len(outlying) == 1 else "them") for row in outlying[:_TOLD])
-        if len(outlying) > _TOLD:
-            told += f" So do {counted(len(outlying) - _TOLD, 'other row')}, on line "
-            told += f"{', '.join(str(int(row.of.line[0])) for row in outlying[_TOLD:])}."
-        notices.append(OUTLYING_ROW(f"{told} The standard excludes no row, and none was left out."))
-    if found.outlying_pushes:
-        told = " ".join(_push_words(push) for push in found.outlying_pushes)
-        notices.append(OUTLYING_PUSH(f"{told} The standard excludes no reading, and none was left out."))
+        words = " ".join(_outlying_words(row, "it" if len(outlying) == 1 else "them") for row in outlying[:_NAMED_ROWS])
+        if len(outlying) > _NAMED_ROWS:
+            words += f" So do {counted(len(outlying) - _NAMED_ROWS, 'other row')}, on line "
+            words += f"{', '.join(str(int(row.of.line[0])) for row in outlying[_NAMED_ROWS:])}."
+        notices.append(OUTLYING_ROW(f"{words} The standard excludes no row, and none was left out."))
+    if evaluation.outlying_pushes:
+        words = " ".join(_push_words(push) for push in evaluation.outlying_pushes)
+        notices.append(OUTLYING_PUSH(f"{words} The standard excludes no reading, and none was left out."))
     if places:
-        told = "; ".join(_places_words(place) for place in places[:_TOLD])
-        more = f"; and {len(places) - _TOLD} more" if len(places) > _TOLD else ""
+        words = "; ".join(_places_words(place) for place in places[:_NAMED_ROWS])
+        more = f"; and {len(places) - _NAMED_ROWS} more" if len(places) > _NAMED_ROWS else ""
         notices.append(
             TWO_PLACES(
-                f"The tip comes to rest in two places: {told}{more}. The values stand, but the intervals of RP and RD "
+                f"The tip comes to rest in two places: {words}{more}. The values stand, but the intervals of RP and RD "
                 "may not hold."
             )
         )
-    if found.unusual.alike:
-        told = "; ".join(
-            f"{one.test}, {100 * one.velocity:g} %, load {100 * one.load:g} % (correlation {one.correlation:.2f}, of "
-            f"independent cycles up to {2 * one.usual:.2f})"
-            for one in found.unusual.alike[:_TOLD_PLACES]
+    if evaluation.unusual.alike:
+        words = "; ".join(
+            f"{test.test}, {100 * test.velocity:g} %, load {100 * test.load:g} % (correlation {test.correlation:.2f}, "
+            f"of independent cycles up to {2 * test.usual:.2f})"
+            for test in evaluation.unusual.alike[:_NAMED_PLACES]
         )
         notices.append(
             CYCLES_ALIKE(
-                f"Each cycle is like the one before it: {told}. Intervals assume that cycles are independent, and are "
+                f"Each cycle is like the one before it: {words}. Intervals assume that cycles are independent, and are "
                 "too narrow here."
             )
         )
-    turned = [v for v in found.values if v.id == "AP" and v.quantity == "angle" and abs(v.value) > _FAR_TURNED]
+    turned = [v for v in evaluation.values if v.id == "AP" and v.quantity == "angle" and abs(v.value) > _FAR_TURNED]
     if turned:
         worst = max(turned, key=lambda value: abs(value.value))
         notices.append(
@@ -289,12 +291,14 @@ def row_notices(found: Evaluation) -> tuple[Notice, ...]:
                 "the alignment."
             )
         )
-    if found.missing:
-        told = "; ".join(found.missing[:_TOLD_PLACES])
-        more = f"; and {len(found.missing) - _TOLD_PLACES} more" if len(found.missing) > _TOLD_PLACES else ""
+    if evaluation.missing:
+        words = "; ".join(evaluation.missing[:_NAMED_PLACES])
+        more = (
+            f"; and {len(evaluation.missing) - _NAMED_PLACES} more" if len(evaluation.missing) > _NAMED_PLACES else ""
+        )
         notices.append(
             PLACES_MISSING(
-                f"Planned and without a row: {told}{more}. The worst of the others is not what the standard asks for."
+                f"Planned and without a row: {words}{more}. The worst of the others is not what the standard asks for."
             )
         )
     return tuple(notices)
@@ -308,10 +312,10 @@ MORE_CYCLES: Final = Rule(
 )
 
 
-def cycle_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
+def cycle_notices(plan: PerformancePlan, evaluation: Evaluation) -> list[Notice]:
     """Return what is to be known about cycles that are fewer or more than planned."""
     few, more = dict[str, None](), dict[str, None]()
-    for value in found.values:
+    for value in evaluation.values:
         planned = plan.test(TEST_OF[value.id])
         if planned is None or value.component != "position" or value.status == "not-measured":
             continue
@@ -342,9 +346,9 @@ OTHER_CUBE: Final = Rule(
 )
 
 
-def cube_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
+def cube_notices(plan: PerformancePlan, evaluation: Evaluation) -> list[Notice]:
     """Return what is to be known where the poses are those of another cube."""
-    other = other_cube(found.clouds, plan.cube.side)
+    other = other_cube(evaluation.clouds, plan.cube.side)
     if other is None:
         return []
     side = 1e3 * plan.cube.side
@@ -358,9 +362,9 @@ def cube_notices(plan: PerformancePlan, found: Evaluation) -> list[Notice]:
 
 
 def _some(words: Collection[str]) -> str:
-    told = list(words)
-    more = f"; and {len(told) - _TOLD_PLACES} more" if len(told) > _TOLD_PLACES else ""
-    return "; ".join(told[:_TOLD_PLACES]) + more
+    places = list(words)
+    more = f"; and {len(places) - _NAMED_PLACES} more" if len(places) > _NAMED_PLACES else ""
+    return "; ".join(places[:_NAMED_PLACES]) + more
 
 
 COPIED_SAMPLES: Final = Rule(
@@ -377,11 +381,11 @@ def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:
     """Return what is to be known about samples that two cycles share."""
     if not blocks:
         return []
-    told = "; ".join(_copied_words(block) for block in blocks[:_TOLD])
-    more = f"; and {len(blocks) - _TOLD} more" if len(blocks) > _TOLD else ""
+    described = "; ".join(_copied_words(block) for block in blocks[:_NAMED_ROWS])
+    more = f"; and {len(blocks) - _NAMED_ROWS} more" if len(blocks) > _NAMED_ROWS else ""
     return [
         COPIED_SAMPLES(
-            f"Cycles have samples at the same places to the last digit: {told}{more}. No robot does that: one was "
+            f"Cycles have samples at the same places to the last digit: {described}{more}. No robot does that: one was "
             "copied from the other, or the readings are simulated without noise. RT and what else says how cycles "
             "differ is too small."
         )
@@ -389,27 +393,27 @@ def copied_notices(blocks: Sequence[CopiedBlock]) -> list[Notice]:
 
 
 def _copied_words(block: CopiedBlock) -> str:
-    one, other = block.cycles
-    cycles = f"cycles {one} and {other} of " if one and other else ""
+    cycle, other = block.cycles
+    cycles = f"cycles {cycle} and {other} of " if cycle and other else ""
     return f"{cycles}{block.test} {block.place}, {block.count} samples from lines {block.lines[0]} and {block.lines[1]}"
 
 
 def _outlying_words(row: OutlyingRow, without: str) -> str:
     away, scatter = (_size(number, row.kind) for number in (row.away, row.scatter))
-    what = "The orientation of cycle" if row.kind == "orientation" else "Cycle"
+    subject = "The orientation of cycle" if row.kind == "orientation" else "Cycle"
     changes = "; ".join(_change_words(*pair, without) for pair in row.changes[:_VALUES])
     return (
-        f"{what} {int(row.of.cycle[0])} of {_under_words(row.of)}, on line {int(row.of.line[0])} lies {away} from the "
-        f"others, which scatter by {scatter}{': ' if changes else ''}{changes}."
+        f"{subject} {int(row.of.cycle[0])} of {_under_words(row.of)}, on line {int(row.of.line[0])} lies {away} from "
+        f"the others, which scatter by {scatter}{': ' if changes else ''}{changes}."
     )
 
 
-def _push_words(one: OutlyingPush) -> str:
+def _push_words(push: OutlyingPush) -> str:
     unit, per_si = UNITS["compliance"]
     return (
-        f"The push of {one.force:g} N along {one.direction} in cycle {one.cycle}, on line {one.line}, lies "
-        f"{1e3 * one.away:.3g} mm from the line of the others: compliance is {one.value * per_si:.6f} {unit}, "
-        f"without it {one.without * per_si:.6f}."
+        f"The push of {push.force:g} N along {push.direction} in cycle {push.cycle}, on line {push.line}, lies "
+        f"{1e3 * push.away:.3g} mm from the line of the others: compliance is {push.value * per_si:.6f} {unit}, "
+        f"without it {push.without * per_si:.6f}."
     )
 
 
@@ -419,19 +423,19 @@ def _change_words(value: Value, other: Value, without: str) -> str:
     return f"{value.id}{part} is {number_words(value)} {UNITS[value.quantity][0]}, without {without} {left}"
 
 
-def _places_words(one: TwoPlaces) -> str:
-    what = "orientations, " * (one.kind == "orientation")
-    lines = ", ".join(map(str, one.lines[:_TOLD_PLACES])) + ", .." * (len(one.lines) > _TOLD_PLACES)
+def _places_words(places: TwoPlaces) -> str:
+    kind = "orientations, " * (places.kind == "orientation")
+    lines = ", ".join(map(str, places.lines[:_NAMED_PLACES])) + ", .." * (len(places.lines) > _NAMED_PLACES)
     return (
-        f"{_under_words(one.of)} ({what}{one.rows[0]} and {one.rows[1]} cycles, {_size(one.apart, one.kind)} apart; "
-        f"the {one.rows[0]} on lines {lines})"
+        f"{_under_words(places.of)} ({kind}{places.rows[0]} and {places.rows[1]} cycles, "
+        f"{_size(places.apart, places.kind)} apart; the {places.rows[0]} on lines {lines})"
     )
 
 
-def _under_words(one: Cycles) -> str:
-    robot = f" of {one.robot}" if one.robot else ""
-    approach = f" from {one.approach}" if one.approach else ""
-    return f"{one.test} {one.pose}{approach}{robot}, {100 * one.velocity:g} %, load {100 * one.load:g} %"
+def _under_words(cycles: Cycles) -> str:
+    robot = f" of {cycles.robot}" if cycles.robot else ""
+    approach = f" from {cycles.approach}" if cycles.approach else ""
+    return f"{cycles.test} {cycles.pose}{approach}{robot}, {100 * cycles.velocity:g} %, load {100 * cycles.load:g} %"
 
 
 def _size(number: float, kind: Kind) -> str:

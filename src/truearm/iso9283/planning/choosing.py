@@ -103,7 +103,7 @@ def performance_plan(
     _refuse_unfit(robot, ahead)
     find = cube is None
     whole = cube if cube is not None else largest_cube(robot, target=target, ahead=ahead, nearest=nearest, floor=floor)
-    kept = unclear is not None or unsuited is not None
+    restricted = unclear is not None or unsuited is not None
     missed = ""
 
     def planned_in(tried: Cube, R: Array, wanted: Sequence[str]) -> PerformancePlan | None:
@@ -113,26 +113,26 @@ def performance_plan(
         if not layout.reached(unclear):
             missed = layout.missed
             return None
-        found = layout.plan(velocities, loads, rated_load, rated_velocity, limit_band, hours)
-        words = "" if unsuited is None else unsuited(found)
+        trial_plan = layout.plan(velocities, loads, rated_load, rated_velocity, limit_band, hours)
+        words = "" if unsuited is None else unsuited(trial_plan)
         missed = words or missed
-        return None if words else found
+        return None if words else trial_plan
 
-    for tried in [whole] if not find else _within(whole, ahead) if kept else _shrunk(whole):
+    for tried in [whole] if not find else _within(whole, ahead) if restricted else _shrunk(whole):
         for R in [rotation] if rotation is not None else _orientations(tried.plane(plane), ahead):
             # The cube is that of the robot: the same whichever tests are planned in it.
             if find and set(tests) != set(TESTS) and planned_in(tried, R, tuple(TESTS)) is None:
                 continue
-            found = planned_in(tried, R, tests)
-            if found is not None:
-                return found
+            fitting = planned_in(tried, R, tests)
+            if fitting is not None:
+                return fitting
     raise InputError(
         "the robot cannot come to all poses and along all paths of the cube with one orientation, in one posture"
-        + (", and keep clear" if kept else ""),
+        + (", and keep clear" if restricted else ""),
         where=robot.name,
         came=f"missed: {missed}",
         cure="See that boxes, floor and limits leave the arm room, lower `clearance`, or look in another direction."
-        if find and kept
+        if find and restricted
         else "Take a smaller cube, another centre, plane or orientation.",
     )
 
@@ -168,9 +168,9 @@ def _within(whole: Cube, ahead: str) -> Iterator[Cube]:
     aside = np.cross(up, out)
     share = 1.0
     while share >= _SMALLEST_WITHIN:
-        room = (1.0 - share) * whole.side / 2.0
-        for way in (0.0 * up, up, out, up + out, aside, -aside, -up) if room > 0.0 else (0.0 * up,):
-            yield Cube(whole.centre + room * way, share * whole.side)
+        margin = (1.0 - share) * whole.side / 2.0
+        for way in (0.0 * up, up, out, up + out, aside, -aside, -up) if margin > 0.0 else (0.0 * up,):
+            yield Cube(whole.centre + margin * way, share * whole.side)
         share *= _SHRUNK_WITHIN
 
 
@@ -179,14 +179,14 @@ def _orientations(plane: DiagonalPlane, ahead: str) -> list[Array]:
     direction = np.zeros(3)
     direction["xy".index(ahead[1])] = 1.0 if ahead[0] == "+" else -1.0
     through = plane.normal if plane.normal @ direction > 0 else -plane.normal
-    found = []
+    orientations = []
     for z in (np.array([0.0, 0.0, -1.0]), through, direction):
         x = plane.along - (plane.along @ z) * z
         if np.linalg.norm(x) < 0.1:
             x = np.array([0.0, 0.0, 1.0]) - z[2] * z
         x = x / np.linalg.norm(x)
-        found.append(np.stack([x, np.cross(z, x), z], axis=1))
-    return found
+        orientations.append(np.stack([x, np.cross(z, x), z], axis=1))
+    return orientations
 
 
 def _test(name: str, velocities: Sequence[float], loads: Sequence[float], layout: _Layout) -> PlannedTest:
@@ -236,7 +236,7 @@ class _Layout:
         self.paths = {name: path for name, path in self._paths().items() if name in wanted}
         if "AT-reorientation" not in tests:
             self.paths = {name: replace(path, other=None) for name, path in self.paths.items()}
-        self.found = np.zeros((0, len(robot.joints)))
+        self.joint_positions = np.zeros((0, len(robot.joints)))
         self.names = [*self.places, *self.distances]
 
     def _paths(self) -> dict[str, PlannedPath]:
@@ -305,7 +305,7 @@ class _Layout:
                 self.missed = f"a posture that keeps clear on every path ({words})"
                 continue
             if not far:
-                self.found = joint_solutions.joints
+                self.joint_positions = joint_solutions.joints
                 return True
             self.missed = f"{far[0]} without a change of posture"
         return False
@@ -321,9 +321,9 @@ class _Layout:
             return [(first.joints[0], None)]
         postures: list[tuple[Array, str | None]] = []
         for name in BRANCHES:
-            there = inverse(self.robot, at, turned, target=self.target, branch=name)
-            if there.status[0].usable:
-                postures.append((there.joints[0], name))
+            solution = inverse(self.robot, at, turned, target=self.target, branch=name)
+            if solution.status[0].usable:
+                postures.append((solution.joints[0], name))
         return sorted(postures, key=lambda posture: float(np.abs(posture[0] - first.joints[0]).max()))
 
     def plan(
@@ -354,12 +354,15 @@ class _Layout:
     def poses(self) -> Mapping[str, PlannedPose]:
         """Return the poses with their joint positions."""
         rows = [*self.places.items(), *self.distances.items()]
-        return {name: PlannedPose(name, p, self.rotation, q) for (name, p), q in zip(rows, self.found, strict=False)}
+        return {
+            name: PlannedPose(name, p, self.rotation, q)
+            for (name, p), q in zip(rows, self.joint_positions, strict=False)
+        }
 
     def starts(self) -> Mapping[tuple[str, str], PlannedPose]:
         """Return where each approach begins."""
         first = len(self.names)
         return {
-            key: PlannedPose(f"{key[0]} from {key[1]}", p, self.rotation, self.found[first + k])
+            key: PlannedPose(f"{key[0]} from {key[1]}", p, self.rotation, self.joint_positions[first + k])
             for k, (key, p) in enumerate(self.begin.items())
         }

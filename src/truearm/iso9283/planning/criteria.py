@@ -165,7 +165,7 @@ class PerformancePlan:
 
     def test(self, test: str) -> PlannedTest | None:
         """Return what is planned for a test, None if nothing is."""
-        return next((one for one in self.tests if one.id == test), None)
+        return next((planned for planned in self.tests if planned.id == test), None)
 
 
 def visited(test: PlannedTest) -> tuple[str, ...]:

@@ -45,16 +45,16 @@ def planned(asked: PlanTests) -> Iso9283Plan:
     """Plan the tests, and write what they are done with."""
     given_cube = None if asked.cube == "auto" else path_argument(asked.cube, "cube")
     record = None if asked.slow_run is None else path_argument(asked.slow_run, "slow_run")
-    given = (asked.robot, given_cube, record, asked.constraints)
-    folder = None if asked.out is None else folder_beside(PLAN_FILES, PLAN, asked.out, *given)
+    inputs = (asked.robot, given_cube, record, asked.constraints)
+    folder = None if asked.out is None else folder_beside(PLAN_FILES, PLAN, asked.out, *inputs)
     rules = constraints_argument(asked.constraints)
     arm, target = tip_argument(robot_argument(asked.robot), asked.target, asked.tip, "be measured")
     warnings = wider_limits_notices(arm)
     rated = _rated_load(arm, asked.load)
     if asked.velocity is None:
         warnings.append(RATED_VELOCITY_ASSUMED(f"100 % is taken for {_ASSUMED_VELOCITY * 1e3:g} mm/s along a path."))
-    where = str(asked.constraints) if isinstance(asked.constraints, str | Path) else "constraints"
-    cell = stated_cell(arm, rules, where, asked.clearance)
+    place = str(asked.constraints) if isinstance(asked.constraints, str | Path) else "constraints"
+    cell = stated_cell(arm, rules, place, asked.clearance)
     with refusals_of("cube"):
         whole = None if given_cube is None else read_cube(given_cube)
     with refusals_of("cube" if whole is not None else "robot"):
@@ -76,7 +76,7 @@ def planned(asked: PlanTests) -> Iso9283Plan:
             unclear=None if cell is None else cell.unclear,
             unsuited=None if cell is None else cell.unsuited,
         )
-    kept = "" if cell is None else cell.words(plan)
+    clear_of = "" if cell is None else cell.words(plan)
     if cell is not None:
         warnings += cell_notices(cell.check)
     plan = replace(plan, robot=arm)
@@ -86,20 +86,20 @@ def planned(asked: PlanTests) -> Iso9283Plan:
         programs = written_programs(
             plan, language, 2.0 if asked.dwell is None else asked.dwell, record, warnings, cell_unknown=cell is None
         )
-    iso9283_plan = Iso9283Plan(plan, asked.again, tuple(warnings), files_of(*given), programs, kept)
-    return iso9283_plan if folder is None else _written(iso9283_plan, folder, record, given)
+    iso9283_plan = Iso9283Plan(plan, asked.again, tuple(warnings), files_of(*inputs), programs, clear_of)
+    return iso9283_plan if folder is None else _written(iso9283_plan, folder, record, inputs)
 
 
-def _written(found: Iso9283Plan, folder: Path, record: Path | None, given: Sequence[object]) -> Iso9283Plan:
+def _written(plan: Iso9283Plan, folder: Path, record: Path | None, inputs: Sequence[object]) -> Iso9283Plan:
     """Write the plan, and return it with what is to be known about what it replaced."""
-    contents = found.contents()
+    contents = plan.contents()
     refuse_losing_slow_run(folder, record)
-    if found.programs is not None:
-        folder_for(tuple(contents), folder, *given, ours=True)
+    if plan.programs is not None:
+        folder_for(tuple(contents), folder, *inputs, ours=True)
     refuse_stale(folder, tuple(contents), record)
     replaced = replaced_notices(folder, PLAN, contents[PLAN])
-    found.save(folder)
-    return replace(found, warnings=(*found.warnings, *replaced))
+    plan.save(folder)
+    return replace(plan, warnings=(*plan.warnings, *replaced))
 
 
 def _tests(criteria: Sequence[str]) -> tuple[str, ...]:

@@ -213,35 +213,35 @@ def read_plan(path: Path) -> PerformancePlan:
     poses: dict[str, PlannedPose] = {}
     tip = Tip(robot, content.target)
     for number, entry in enumerate(content.poses, 1):
-        where = f"{path}, poses[{number}]"
+        location = f"{path}, poses[{number}]"
         if entry.name in poses:
-            raise InputError("two poses have this name", where=where, came=entry.name, cure="Name each once.")
-        with refusals_at(where):
+            raise InputError("two poses have this name", where=location, came=entry.name, cure="Name each once.")
+        with refusals_at(location):
             poses[entry.name] = _planned(entry.name, entry, tip, cube)
     starts: dict[tuple[str, str], PlannedPose] = {}
     for number, start in enumerate(content.starts, 1):
-        where = f"{path}, starts[{number}]"
-        _known(start.pose, poses, where, "pose")
+        location = f"{path}, starts[{number}]"
+        _known(start.pose, poses, location, "pose")
         if (start.pose, start.approach) in starts:
-            raise InputError("two approaches of a pose have this name", where=where, came=start.approach)
-        with refusals_at(where):
+            raise InputError("two approaches of a pose have this name", where=location, came=start.approach)
+        with refusals_at(location):
             starts[start.pose, start.approach] = _planned(f"{start.pose} from {start.approach}", start, tip, cube)
     paths: dict[str, PlannedPath] = {}
     for number, way in enumerate(content.paths, 1):
-        where = f"{path}, paths[{number}]"
+        location = f"{path}, paths[{number}]"
         if way.name in paths:
-            raise InputError("two paths have this name", where=where, came=way.name, cure="Name each once.")
-        with refusals_at(where):
+            raise InputError("two paths have this name", where=location, came=way.name, cure="Name each once.")
+        with refusals_at(location):
             paths[way.name] = _planned_path(way)
     tests: list[PlannedTest] = []
     for number, test in enumerate(content.tests, 1):
-        where = f"{path}, tests[{number}]"
-        _known(test.criterion, TESTS, where, "test")
-        if any(one.id == test.criterion for one in tests):
-            raise InputError("this test is planned twice", where=where, came=test.criterion, cure="Leave one out.")
+        location = f"{path}, tests[{number}]"
+        _known(test.criterion, TESTS, location, "test")
+        if any(planned.id == test.criterion for planned in tests):
+            raise InputError("this test is planned twice", where=location, came=test.criterion, cure="Leave one out.")
         for place in test.places:
-            _known(place, paths if TESTS[test.criterion].readings == "paths" else poses, where, "place")
-        _check_approaches(test, poses, starts, where)
+            _known(place, paths if TESTS[test.criterion].readings == "paths" else poses, location, "place")
+        _check_approaches(test, poses, starts, location)
         velocities, loads = (tuple(v / 100.0 for v in shares) for shares in (test.velocities, test.loads))
         tests.append(PlannedTest(test.criterion, test.places, test.cycles, velocities, loads, test.approaches))
     return PerformancePlan(
@@ -290,30 +290,30 @@ def read_cube(path: Path) -> Cube:
 
 
 def _check_approaches(
-    test: _Test, poses: Mapping[str, PlannedPose], starts: Mapping[tuple[str, str], PlannedPose], where: str
+    test: _Test, poses: Mapping[str, PlannedPose], starts: Mapping[tuple[str, str], PlannedPose], place: str
 ) -> None:
     if test.criterion == "vAP":
         missing = [f"{p} from {a}" for p in test.places for a in test.approaches if (p, a) not in starts]
         if missing or len(test.approaches) < 2:
             raise InputError(
                 "poses are gone to from two directions or more, each with its start",
-                where=where,
+                where=place,
                 came=f"no start: {missing[0]}" if missing else f"{len(test.approaches)} approaches",
                 cure="Add it to starts.",
             )
     elif test.criterion == "compliance":
         for approach in test.approaches:
-            _known(approach, ("+x", "-x", "+y", "-y", "+z", "-z"), where, "direction")
+            _known(approach, ("+x", "-x", "+y", "-y", "+z", "-z"), place, "direction")
     elif test.criterion == "posing-time":
         for approach in test.approaches:
-            _known(approach, poses, where, "pose")
+            _known(approach, poses, place, "pose")
     elif test.approaches:
-        raise InputError("this test has no approaches", where=where, came=", ".join(test.approaches))
+        raise InputError("this test has no approaches", where=place, came=", ".join(test.approaches))
 
 
-def _known(name: str, known: Mapping[str, object] | Sequence[str], where: str, what: str) -> None:
+def _known(name: str, known: Mapping[str, object] | Sequence[str], place: str, kind: str) -> None:
     if name not in known:
-        raise InputError(f"the plan has no such {what}", where=where, came=name, allowed=", ".join(known))
+        raise InputError(f"the plan has no such {kind}", where=place, came=name, allowed=", ".join(known))
 
 
 def _planned(name: str, entry: _Pose | _Start, tip: Tip, cube: Cube) -> PlannedPose:
@@ -333,9 +333,9 @@ def _planned(name: str, entry: _Pose | _Start, tip: Tip, cube: Cube) -> PlannedP
         )
     units = ["mm" if joint.kind == "prismatic" else "deg" for joint in robot.joints]
     joints = np.array([sized_si(v, unit, "joints") for v, unit in zip(entry.joints, units, strict=True)])
-    there = tip.at(joints[None])
-    away = float(np.linalg.norm(there.position[0] - position))
-    turned = float(np.linalg.norm(there.rotation[0] - rotation)) / np.sqrt(2.0)
+    tip_pose = tip.at(joints[None])
+    away = float(np.linalg.norm(tip_pose.position[0] - position))
+    turned = float(np.linalg.norm(tip_pose.rotation[0] - rotation)) / np.sqrt(2.0)
     if away > _NEAR[0] or turned > _NEAR[1]:
         raise InputError(
             "these joint positions do not bring the tip to the pose",

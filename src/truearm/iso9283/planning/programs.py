@@ -111,15 +111,20 @@ def measuring_programs(plan: PerformancePlan, dwell: float, mark: str, language:
             cure="Plan for the nominal robot, and correct its programs with the calibrated one.",
         )
     slow = min(_SLOW, _SLOW_SPEED / plan.rated_velocity)
-    made = _Programs(plan, dwell, mark, slow, language)
+    programs = _Programs(plan, dwell, mark, slow, language)
     first: list[MotionProgram] = []
     faster: list[MotionProgram] = []
     for test in plan.tests:
-        share = min(slow, _SLOW_SPEED / (plan.rated_velocity * made.pace(test)))
-        first += made.of(test, share)
+        share = min(slow, _SLOW_SPEED / (plan.rated_velocity * programs.pace(test)))
+        first += programs.of(test, share)
         if test.id != "compliance":
-            faster += [one for other in test.velocities if abs(other - share) > 1e-9 for one in made.of(test, other)]
-    return MeasuringPrograms(tuple(first), tuple(faster), slow, {**made.moves, **made.routes.driven})
+            faster += [
+                program
+                for other in test.velocities
+                if abs(other - share) > 1e-9
+                for program in programs.of(test, other)
+            ]
+    return MeasuringPrograms(tuple(first), tuple(faster), slow, {**programs.moves, **programs.routes.driven})
 
 
 def driven_ways(plan: PerformancePlan) -> Mapping[str, Array]:
@@ -130,10 +135,10 @@ def driven_ways(plan: PerformancePlan) -> Mapping[str, Array]:
     """
     # A second cycle begins where the first has ended; the others go the same ways.
     twice = replace(plan, tests=tuple(replace(test, cycles=min(2, test.cycles)) for test in plan.tests))
-    made = _Programs(twice, 0.0, "", 1.0, "")
+    programs = _Programs(twice, 0.0, "", 1.0, "")
     for test in twice.tests:
-        _Steps(made, test, 1.0).run()
-    return {**made.moves, **made.routes.driven}
+        _Steps(programs, test, 1.0).run()
+    return {**programs.moves, **programs.routes.driven}
 
 
 def _is_calibrated(robot: Robot) -> bool:
@@ -161,10 +166,10 @@ class _Programs:
             raise InputError("a pose is not in the plan", where=test, came=name, allowed=", ".join(self.plan.poses))
         return self.plan.poses[name]
 
-    def route(self, test: str, place: str, found: Callable[[], Route]) -> Route:
+    def route(self, test: str, place: str, follow: Callable[[], Route]) -> Route:
         """Return a way, which is followed where it is first asked for."""
         if (test, place) not in self.known:
-            self.known[test, place] = found()
+            self.known[test, place] = follow()
         return self.known[test, place]
 
     def joint_share(self, ways: Array | None, share: float) -> float:
@@ -286,8 +291,8 @@ class _Steps:
     def _stand(self) -> None:
         self.steps.append(Wait(self.programs.dwell))
 
-    def _cycle(self, number: int, what: str = "") -> None:
-        self.steps.append(Remark(f"{what}cycle {number + 1} of {self.test.cycles}"))
+    def _cycle(self, number: int, prefix: str = "") -> None:
+        self.steps.append(Remark(f"{prefix}cycle {number + 1} of {self.test.cycles}"))
 
     def _visits(self, names: Iterable[str]) -> None:
         poses = [self.programs.pose(name, self.test.id) for name in names]
@@ -370,14 +375,14 @@ class StatedCell:
     def unclear(self, joints: Array) -> str:
         """Return what is not kept at joint positions ``(n, joints)``, in words; nothing if all is."""
         own = bool(self.robot.targets)
-        kept = allowed(self.robot, Postures(joints), self.rules, self.where, seen_from_the_origin=own)
-        broken = [name for name, held in kept.items() if not held.all()]
+        fulfilled = allowed(self.robot, Postures(joints), self.rules, self.where, seen_from_the_origin=own)
+        broken = [name for name, rows in fulfilled.items() if not rows.all()]
         if broken:
             return f"{', '.join(broken)} of the constraints"
-        rooms = self.check.rooms(joints)
-        if not rooms.size or rooms.min() >= self.check.need:
+        distances = self.check.distances(joints)
+        if not distances.size or distances.min() >= self.check.need:
             return ""
-        return self._near(int(np.unravel_index(int(np.argmin(rooms)), rooms.shape)[0]), float(rooms.min()))
+        return self._near(int(np.unravel_index(int(np.argmin(distances)), distances.shape)[0]), float(distances.min()))
 
     def unsuited(self, plan: PerformancePlan) -> str:
         """Return which ways of a plan cannot be driven, in words; nothing if all can."""
@@ -388,37 +393,40 @@ class StatedCell:
         near = {}
         for name, joints in ways.items():
             looked = self.check.ways(joints[:-1], joints[1:])
-            if len(looked.room) and looked.room.min() < self.cell.clearance:
-                at = int(np.argmin(looked.room))
-                near[name] = (float(looked.room[at]), int(looked.worst[at]))
+            if len(looked.distance) and looked.distance.min() < self.cell.clearance:
+                at = int(np.argmin(looked.distance))
+                near[name] = (float(looked.distance[at]), int(looked.worst[at]))
         if not near:
             return ""
         worst = sorted(near, key=lambda name: near[name][0])
-        room, number = near[worst[0]]
+        distance, number = near[worst[0]]
         named = "; ".join(worst[:_MOST_NAMED]) + ("; and others" if len(near) > _MOST_NAMED else "")
-        return f"{len(near)} of {counted(len(ways), 'way')} are not clear ({named}; nearest {self._near(number, room)})"
+        return (
+            f"{len(near)} of {counted(len(ways), 'way')} are not clear ({named}; nearest "
+            f"{self._near(number, distance)})"
+        )
 
     def words(self, plan: PerformancePlan) -> str:
         """Say what all ways of a plan keep, that is suited."""
         distances: dict[str, float] = {}
         ways = driven_ways(plan).values()
         for joints in ways:
-            for what, room in nearest_on(self.check, joints).items():
-                distances[what] = min(room, distances.get(what, math.inf))
+            for pair, distance in nearest_on(self.check, joints).items():
+                distances[pair] = min(distance, distances.get(pair, math.inf))
         nearest_first = dict(sorted(distances.items(), key=lambda item: item[1]))
         near = distance_words(nearest_first, self.cell.floor, self.cell.surface, self.check.connected)
         return f"On all {counted(len(ways), 'way')} the arm stays {near}." if near else ""
 
-    def _near(self, number: int, room: float) -> str:
-        return f"{self.check.words(number)}, {max(room, 0.0) * 1e3:.0f} mm"
+    def _near(self, number: int, distance: float) -> str:
+        return f"{self.check.words(number)}, {max(distance, 0.0) * 1e3:.0f} mm"
 
 
-def stated_cell(robot: Robot, rules: Constraints | None, where: str, clearance: float | None) -> StatedCell | None:
+def stated_cell(robot: Robot, rules: Constraints | None, place: str, clearance: float | None) -> StatedCell | None:
     """Return the cell that was stated; None if none was.
 
     Args:
         robot: With the target that is measured.
-        rules, where: Constraints as for plans of measurements, and the file that says so.
+        rules, place: Constraints as for plans of measurements, and the file that says so.
         clearance: Room to keep [m]; None for 50 mm.
 
     Raises:
@@ -426,16 +434,16 @@ def stated_cell(robot: Robot, rules: Constraints | None, where: str, clearance: 
     """
     if rules is None and clearance is None:
         return None
-    cell = cell_argument(robot, rules, where, None, False, clearance)
-    joint_window(robot, rules, where)  # refuses limits that leave nothing
-    refuse_clearance_of(robot, rules, where)
-    low, high = limits_of(robot, rules, where)
+    cell = cell_argument(robot, rules, place, None, False, clearance)
+    joint_window(robot, rules, place)  # refuses limits that leave nothing
+    refuse_clearance_of(robot, rules, place)
+    low, high = limits_of(robot, rules, place)
     joints = tuple(
         joint if not np.isfinite([a, b]).all() else replace(joint, limits=(float(a), float(b)))
         for joint, a, b in zip(robot.joints, low, high, strict=True)
     )
     arm = replace(robot, joints=joints)
-    return StatedCell(arm, cell, CollisionCheck(arm, cell), rules, where)
+    return StatedCell(arm, cell, CollisionCheck(arm, cell), rules, place)
 
 
 #: Where programs are, in the folder of the plan.
@@ -467,9 +475,9 @@ def written_programs(
     refuse_unknown_counts(plan.robot, language.name)
     text = plan_text(plan)
     with refusals_of("program"):
-        found = measuring_programs(plan, dwell, hash_of(text.encode())[:_MARK], language.name)
-        slow = _texts(found.slow, language)
-        faster = {} if slow_run is None else _texts(found.faster, language)
+        programs = measuring_programs(plan, dwell, hash_of(text.encode())[:_MARK], language.name)
+        slow = _texts(programs.slow, language)
+        faster = {} if slow_run is None else _texts(programs.faster, language)
     record = None
     if slow_run is None:
         record = slow_run_text(text, slow)
@@ -481,23 +489,23 @@ def written_programs(
         warnings.append(MAKER(f"{robot.name} is of {robot.maker}, and programs were written in {language.name}."))
     warnings += [*counts_notices(robot), *_speed_notices(robot, language)]
     if cell_unknown:
-        warnings += _near(plan.robot, found.ways)
-    count = len(found.slow) + (0 if slow_run is None else len(found.faster))
-    return WrittenPrograms(language.name, {**slow, **faster}, record, count, found.share)
+        warnings += _near(plan.robot, programs.ways)
+    count = len(programs.slow) + (0 if slow_run is None else len(programs.faster))
+    return WrittenPrograms(language.name, {**slow, **faster}, record, count, programs.share)
 
 
 def _speed_notices(robot: Robot, language: Language) -> list[Notice]:
     """Return what is to be said of the speed of joint motions."""
-    found = []
+    notices = []
     if language.name in _JOINT_SPEEDS:
         words = f"{language.name} says no share of the joints' speed: {_JOINT_SPEEDS[language.name]}."
-        found.append(JOINT_SPEED_ASSUMED(words))
+        notices.append(JOINT_SPEED_ASSUMED(words))
     if language.name == "RAPID":
-        return found
+        return notices
     assumed = "in the slow run joint motions are so slow that the tip keeps to 250 mm/s with the joints of fast arms"
     if language.name == "URScript":
         assumed = f"100 % is taken for {math.degrees(FASTEST):.0f} deg/s"
-    return [*found, *speed_notices(robot, assumed)]
+    return [*notices, *speed_notices(robot, assumed)]
 
 
 def _texts(programs: Sequence[MotionProgram], language: Language) -> dict[str, str]:
@@ -519,16 +527,16 @@ def _near(robot: Robot, ways: Mapping[str, Array]) -> list[Notice]:
     cell = cell_argument(robot, None, "")
     check = CollisionCheck(robot, cell)
     looked = {name: check.ways(joints[:-1], joints[1:]) for name, joints in ways.items() if len(joints) > 1}
-    near = {name: at for name, at in looked.items() if at.room.min() < cell.clearance}
+    near = {name: at for name, at in looked.items() if at.distance.min() < cell.clearance}
     if not near:
         return []
-    worst = min(near, key=lambda name: float(near[name].room.min()))
-    at = int(np.argmin(near[worst].room))
-    room = max(float(near[worst].room[at]), 0.0)
+    worst = min(near, key=lambda name: float(near[name].distance.min()))
+    at = int(np.argmin(near[worst].distance))
+    distance = max(float(near[worst].distance[at]), 0.0)
     return [
         WAYS_NEAR(
             f"On {len(near)} of {len(looked)} ways the arm comes within {cell.clearance * 1e3:g} mm of the floor or of "
-            f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {room * 1e3:.0f} mm."
+            f"itself, nearest on {worst}: {check.words(int(near[worst].worst[at]))}, {distance * 1e3:.0f} mm."
         )
     ]
 
@@ -538,7 +546,7 @@ def refuse_losing_slow_run(folder: Path, slow_run: Path | None) -> None:
     path = folder / SLOW_RUN
     if slow_run is not None or not exists(path):
         return
-    written = {one.files[SLOW_RUN] for one in sets_in(folder) if SLOW_RUN in one.files}
+    written = {file_set.files[SLOW_RUN] for file_set in sets_in(folder) if SLOW_RUN in file_set.files}
     if hash_of(read_bytes(path)) not in written:
         raise InputError(
             "somebody has filled in this record of a slow run, and it would be lost",
@@ -555,11 +563,11 @@ def refuse_stale(folder: Path, names: Collection[str], slow_run: Path | None) ->
         names: Of the files that are written.
         slow_run: The record that was given: it may be there.
     """
-    written = [name for one in sets_in(folder) for name in one.files]
+    written = [name for file_set in sets_in(folder) for name in file_set.files]
     for name in written:
-        given = name == SLOW_RUN and slow_run is not None and same_place(folder / name, slow_run)
+        is_slow_run = name == SLOW_RUN and slow_run is not None and same_place(folder / name, slow_run)
         theirs = name == SLOW_RUN or name.startswith(f"{_FOLDER}/")
-        if theirs and not given and name not in names and exists(folder / name):
+        if theirs and not is_slow_run and name not in names and exists(folder / name):
             raise InputError(
                 "programs of another plan are there, and would stay beside this one",
                 parameter="out",

@@ -96,12 +96,12 @@ class Iso9283Plan(Record):
         """Return the texts of all files by their names."""
         from truearm.iso9283.planning.sheet import iso9283_sheet
 
-        found = {PLAN: plan_text(self.plan), ROBOT: robot_text(self.plan.robot), SHEET: iso9283_sheet(self)}
+        texts = {PLAN: plan_text(self.plan), ROBOT: robot_text(self.plan.robot), SHEET: iso9283_sheet(self)}
         if self.programs is not None:
-            found |= self.programs.files
+            texts |= self.programs.files
             if self.programs.record is not None:
-                found[SLOW_RUN] = self.programs.record
-        return found
+                texts[SLOW_RUN] = self.programs.record
+        return texts
 
     @property
     def written(self) -> list[str]:

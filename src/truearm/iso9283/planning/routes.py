@@ -139,7 +139,9 @@ class Routes:
         if path.other is None:
             raise InputError("this path has one orientation, and another is needed", where=name)
         turned = float(np.linalg.norm(rotation_vector((path.other @ path.rotation.T)[None])[0]))
-        flange, tip = (self.robot.forward(self._near, frame="controller", target=one)[0] for one in (None, self.target))
+        flange, tip = (
+            self.robot.forward(self._near, frame="controller", target=frame)[0] for frame in (None, self.target)
+        )
         lever = float(np.linalg.norm(tip - flange))
         count = max(1, math.ceil(turned * math.sqrt(lever / (8.0 * _BESIDE))))
         finer = max(1, math.ceil(way.length / (TURNS * count * _APART)))
@@ -294,7 +296,7 @@ def check_slow_run(path: Path, plan: str, programs: Mapping[str, str], today: da
         )
 
 
-def _day(date: datetime.datetime | datetime.date | str, where: str) -> datetime.date:
+def _day(date: datetime.datetime | datetime.date | str, place: str) -> datetime.date:
     """Return the day that a record names."""
     if isinstance(date, datetime.datetime):
         return date.date()
@@ -305,7 +307,7 @@ def _day(date: datetime.datetime | datetime.date | str, where: str) -> datetime.
     except ValueError:
         raise InputError(
             "the day of the slow run is no date",
-            where=where,
+            where=place,
             came=date,
             allowed="year-month-day, such as 2026-11-23",
             cure="State the day on which the slow programs were run to their end.",

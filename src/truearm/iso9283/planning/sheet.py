@@ -49,7 +49,7 @@ def iso9283_sheet(planned: Iso9283Plan) -> str:
             _tests(plan),
             *_orders(plan),
             _poses(plan),
-            tabled("To note", ("What", ""), tuple((what, "_" * 40) for what in _NOTED)),
+            tabled("To note", ("What", ""), tuple((heading, "_" * 40) for heading in _NOTED)),
             pictured("cube", "Where the poses and paths lie", cube, _cube(plan)),
         ],
         planned.command,
@@ -71,9 +71,9 @@ def _tests(plan: PerformancePlan) -> Section:
     rows = []
     for test in plan.tests:
         known = TESTS[test.id]
-        where = ", ".join((*test.places, *test.approaches))
+        places = ", ".join((*test.places, *test.approaches))
         percent = (", ".join(f"{100 * v:g}" for v in shares) for shares in (test.velocities, test.loads))
-        rows.append((f"{', '.join(known.criteria)}: {known.name}", where, str(test.cycles), *percent, "________"))
+        rows.append((f"{', '.join(known.criteria)}: {known.name}", places, str(test.cycles), *percent, "________"))
     heading = ("Criteria and test", "Where", "Cycles", "Velocity [%]", "Load [%]", "Done")
     return tabled("Tests", heading, tuple(rows))
 

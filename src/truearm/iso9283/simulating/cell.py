@@ -71,7 +71,7 @@ class Stand:
     time: float
     working: float
     joints: Array
-    came: Array
+    previous: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,11 +224,11 @@ class Cell:
         approach: str,
         velocity: float,
         load: float,
-        came: Array,
+        previous: Array,
     ) -> Array:
         """Go to a pose and note where the arm stands; return what was commanded."""
         joints = self.joints(place, load)
-        way = joints - came
+        way = joints - previous
         fast, change = self.drives.velocity * velocity, self.drives.acceleration
         longest = float(np.abs(way).max())
         self.now += longest / fast + fast / change + DWELL
@@ -340,11 +340,11 @@ class Cell:
         frames = np.empty((len(stands), 4, 4))
         for key in dict.fromkeys((s.robot, s.load) for s in stands):
             rows = [row for row, s in enumerate(stands) if (s.robot, s.load) == key]
-            came = [stands[row] for row in rows]
+            chosen = [stands[row] for row in rows]
             frames[rows] = self.arm(*key).at_rest(
-                np.array([s.joints for s in came]),
-                np.array([s.came for s in came]),
-                np.array([s.working for s in came]),
+                np.array([s.joints for s in chosen]),
+                np.array([s.previous for s in chosen]),
+                np.array([s.working for s in chosen]),
             )
         return poses_of(stands, frames, self.tracker, self.rng)
 
@@ -445,10 +445,10 @@ def run_poses(cell: Cell, test: PlannedTest) -> None:
     """Go to all poses in turn, cycle by cycle; where robots are exchanged, with each of them."""
     for robot in range(ROBOTS if test.id == "E" else 1):
         for load, velocity in conditions(test):
-            came = cell.joints(test.places[0] if len(test.places) > 1 else cell.other(test.places[0]), load)
+            previous = cell.joints(test.places[0] if len(test.places) > 1 else cell.other(test.places[0]), load)
             for cycle in range(1, test.cycles + 1):
                 for place in reversed(test.places):
-                    came = cell.stand(test, robot, place, cycle, "", velocity, load, came)
+                    previous = cell.stand(test, robot, place, cycle, "", velocity, load, previous)
 
 
 def run_approaches(cell: Cell, test: PlannedTest) -> None:
@@ -483,7 +483,7 @@ def run_pushes(cell: Cell, test: PlannedTest) -> None:
     """Push the tip in steps up to the rated load."""
     load = test.loads[0]
     place = test.places[0]
-    joints, came = cell.joints(place, load), cell.joints(cell.other(place), load)
+    joints, previous = cell.joints(place, load), cell.joints(cell.other(place), load)
     arm, force = cell.arm(0, load), np.array(_PUSHES) * cell.plan.rated_load * STANDARD_GRAVITY
     to_base = cell.robots[0].twin.robot.base.rotation.T @ cell.base[:3, :3]
     for cycle in range(1, test.cycles + 1):
@@ -495,7 +495,7 @@ def run_pushes(cell: Cell, test: PlannedTest) -> None:
             cell.now += DWELL * n
             frames = arm.at_rest(
                 np.tile(stood, (n, 1)),
-                np.tile(np.sign(joints - came), (n, 1)),
+                np.tile(np.sign(joints - previous), (n, 1)),
                 np.full(n, cell.now + cell.ahead),
                 force[:, None] * (to_base @ along),
             )

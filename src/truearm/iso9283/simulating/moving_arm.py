@@ -48,7 +48,7 @@ def drawn_compliance(robot: Robot, force: float, lever: float, rng: np.random.Ge
         _SHIFT / force if joint.kind == "prismatic" else (_WEAKER if number >= first else 1.0) * _TURN / (force * lever)
         for number, joint in enumerate(robot.joints)
     )
-    return tuple(float(one * share) for one, share in zip(middle, drawn, strict=True))
+    return tuple(float(compliance * share) for compliance, share in zip(middle, drawn, strict=True))
 
 
 # How joints follow their commands: each a damped spring between command and joint, as a position loop makes it.
@@ -116,9 +116,9 @@ class Servo:
                 into[1:, j] += np.convolve(slope[:, j], answers[:, k])[: n - 1]
         off = first - command[0]
         if off.any():
-            rest = self._free(step * np.arange(n, dtype=float))
-            position += rest[:, 0, 0, None] * off
-            velocity += rest[:, 1, 0, None] * off
+            free_response = self._free(step * np.arange(n, dtype=float))
+            position += free_response[:, 0, 0, None] * off
+            velocity += free_response[:, 1, 0, None] * off
         return position, velocity
 
     def _limited(self, command: Array, step: float, first: Array) -> tuple[Array, Array]:
@@ -133,9 +133,9 @@ class Servo:
             free = decay[0, 0] * off + decay[0, 1] * speed + command[k] + self._lag * slope
             wanted = decay[1, 0] * off + decay[1, 1] * speed + slope
             most = self.acceleration * step
-            held = np.clip(np.clip(wanted, v - most, v + most), -self.velocity, self.velocity)
-            q = np.where(held == wanted, free, q + (v + held) / 2 * step)
-            v = held
+            limited = np.clip(np.clip(wanted, v - most, v + most), -self.velocity, self.velocity)
+            q = np.where(limited == wanted, free, q + (v + limited) / 2 * step)
+            v = limited
             position[k], velocity[k] = q, v
         return position, velocity
 
@@ -315,16 +315,16 @@ class MovingArm:
             at = self.pushed.frames(joints, approach=approach, temperature=warm, wrench=wrench)
             lever = (at[TIP][:, :3, 3] - at[_FLANGE][:, :3, 3]) @ base
             wrench = np.concatenate([force, np.cross(lever, force)], axis=1)
-        there = np.asarray(self.pushed.frames(joints, approach=approach, temperature=warm, wrench=wrench)[TIP])
+        loaded = np.asarray(self.pushed.frames(joints, approach=approach, temperature=warm, wrench=wrench)[TIP])
         if self.pushed is self.true:
-            return there
+            return loaded
         # From where the arm stands without giving way, by what the push alone does.
         free, stands = (
             twin.frames(joints, approach=approach, temperature=warm)[TIP] for twin in (self.pushed, self.true)
         )
         moved = stands.copy()
-        moved[:, :3, 3] += there[:, :3, 3] - free[:, :3, 3]
-        moved[:, :3, :3] = there[:, :3, :3] @ free[:, :3, :3].transpose(0, 2, 1) @ stands[:, :3, :3]
+        moved[:, :3, 3] += loaded[:, :3, 3] - free[:, :3, 3]
+        moved[:, :3, :3] = loaded[:, :3, :3] @ free[:, :3, :3].transpose(0, 2, 1) @ stands[:, :3, :3]
         return np.asarray(moved)
 
     def in_motion(self, command: Array, step: float, time: Array, working: float) -> Motion:
@@ -338,14 +338,16 @@ class MovingArm:
         """
         ahead = max(0, math.ceil(-float(time[0]) / step)) + 2
         left = max(0, math.ceil(float(time[-1]) / step) + 2 - len(command))
-        held = np.concatenate([np.repeat(command[:1], ahead, axis=0), command, np.repeat(command[-1:], left, axis=0)])
-        position, velocity = self.drives.servo.follow(held, step)
+        commanded = np.concatenate(
+            [np.repeat(command[:1], ahead, axis=0), command, np.repeat(command[-1:], left, axis=0)]
+        )
+        position, velocity = self.drives.servo.follow(commanded, step)
         acceleration = np.gradient(velocity, step, axis=0)
-        ways = last_moves(held)
+        ways = last_moves(commanded)
 
         def at(time: Array) -> tuple[NDArray[np.intp], Array]:
             steps = time / step + ahead
-            k = np.clip((steps + 1e-9).astype(np.intp), 0, len(held) - 2)
+            k = np.clip((steps + 1e-9).astype(np.intp), 0, len(commanded) - 2)
             return k, np.clip(steps - k, 0.0, 1.0)[:, None]
 
         often = len(time) > 2 and float(time[1] - time[0]) < _FINEST * (1 - 1e-9)
@@ -364,8 +366,8 @@ class MovingArm:
         if often:
             nominal, believed = self._believed(joints)
             joints = _between(position, velocity, *at(time), step)
-            there, oriented = self._believed(joints)
-            place = there + _interpolated(time, grid, place - nominal)
+            tip_place, oriented = self._believed(joints)
+            place = tip_place + _interpolated(time, grid, place - nominal)
             off = rotation_vector(turned @ believed.transpose(0, 2, 1))
             turned = rotation_from_vector(_interpolated(time, grid, off)) @ oriented
         by_joints = self.nominal.jacobian(joints, frame="base", target=self.target)
@@ -403,10 +405,10 @@ def last_moves(joints: Array) -> Array:
     signs = np.where(np.abs(steps) > _STILL, np.sign(steps), 0.0)
     rows = np.arange(len(joints))[:, None]
     latest = np.maximum.accumulate(np.where(signs != 0.0, rows, 0), axis=0)
-    found = np.take_along_axis(signs, latest, axis=0)
+    direction = np.take_along_axis(signs, latest, axis=0)
     first = np.argmax(signs != 0.0, axis=0)
     starts = signs[first, np.arange(joints.shape[1])]
-    return np.asarray(np.where(found == 0.0, starts, found))
+    return np.asarray(np.where(direction == 0.0, starts, direction))
 
 
 def _interpolated(time: Array, grid: Array, values: Array) -> Array:
@@ -482,8 +484,8 @@ class Ramp:
     def _times(self) -> tuple[float, float, float]:
         """How long it speeds up, keeps its speed and slows down."""
         up, down = (max(self.peak - end, 0.0) / self.acceleration for end in (self.before, self.behind))
-        rest = self.length - up * (self.peak + self.before) / 2 - down * (self.peak + self.behind) / 2
-        return up, max(rest, 0.0) / self.peak if self.peak > 0 else 0.0, down
+        cruise = self.length - up * (self.peak + self.before) / 2 - down * (self.peak + self.behind) / 2
+        return up, max(cruise, 0.0) / self.peak if self.peak > 0 else 0.0, down
 
     @property
     def duration(self) -> float:
@@ -524,20 +526,20 @@ def along_lines(points: Array, rotations: Array, pace: Pace, step: float) -> Com
     zones, speeds = _corners(length, along, turning, fastest, pace)
     straight = length - zones[:-1] - zones[1:]
     pieces: list[tuple[float, Ramp | None, int]] = []  # when it begins; the corner's number where it is a blend
-    now = 0.0
+    elapsed = 0.0
     for i, (left, (before, behind)) in enumerate(zip(straight.tolist(), pairwise(speeds.tolist()), strict=True)):
         straight_on = Ramp.over(max(left, 0.0), before, behind, float(fastest[i]), pace.acceleration)
-        pieces.append((now, straight_on, i))
-        now += straight_on.duration
+        pieces.append((elapsed, straight_on, i))
+        elapsed += straight_on.duration
         if zones[i + 1] > 0:
-            pieces.append((now, None, i + 1))
-            now += 2 * zones[i + 1] / behind
-    time = step * np.arange(math.ceil(now / step - 1e-9) + 1, dtype=float)
+            pieces.append((elapsed, None, i + 1))
+            elapsed += 2 * zones[i + 1] / behind
+    time = step * np.arange(math.ceil(elapsed / step - 1e-9) + 1, dtype=float)
     position, turned = np.zeros((len(time), 3)), np.zeros((len(time), 3, 3))
     starts = np.array([piece[0] for piece in pieces])
-    which = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(pieces) - 1)
+    piece_of = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(pieces) - 1)
     for number, (start, ramp, i) in enumerate(pieces):
-        rows = which == number
+        rows = piece_of == number
         if not rows.any():
             continue
         t = time[rows] - start
@@ -557,14 +559,14 @@ def _corners(length: Array, along: Array, turning: Array, fastest: Array, pace: 
     """Return how far ahead of each point its blend begins, and the speed there, ``(k,)`` each; both 0 at the ends."""
     bend = np.linalg.norm(np.diff(along, axis=0), axis=1)
     twist = np.linalg.norm(np.diff(turning, axis=0), axis=1)
-    bent = (bend > _STRAIGHT) | (twist > _STRAIGHT)
-    inner = np.where(bent, np.minimum(pace.zone, np.minimum(length[:-1], length[1:]) / 2), 0.0)
-    room = 2.0 * inner
+    turns = (bend > _STRAIGHT) | (twist > _STRAIGHT)
+    inner = np.where(turns, np.minimum(pace.zone, np.minimum(length[:-1], length[1:]) / 2), 0.0)
+    blended = 2.0 * inner
     slowest = np.minimum(
-        np.sqrt(room * pace.acceleration / np.maximum(bend, _STRAIGHT)),
-        np.sqrt(room * pace.turning_acceleration / np.maximum(twist, _STRAIGHT)),
+        np.sqrt(blended * pace.acceleration / np.maximum(bend, _STRAIGHT)),
+        np.sqrt(blended * pace.turning_acceleration / np.maximum(twist, _STRAIGHT)),
     )
-    passed = np.where(bent, slowest, np.inf)
+    passed = np.where(turns, slowest, np.inf)
     zones = np.concatenate([[0.0], inner, [0.0]])
     speeds = np.concatenate([[0.0], np.minimum(passed, np.minimum(fastest[:-1], fastest[1:])), [0.0]])
     straight = np.maximum(length - zones[:-1] - zones[1:], 0.0)

@@ -116,7 +116,9 @@ class Iso9283Simulation(Record):
             "forces": ("reading", " under a push"),
         }
         rows = self._counts()
-        read = [f"  {counted(rows[name], noun)}{where}" for name, (noun, where) in nouns.items() if rows[name]]
+        read = [
+            f"  {counted(rows[name], noun)}{destination}" for name, (noun, destination) in nouns.items() if rows[name]
+        ]
         yield say(
             *read,
             rows=rows,
@@ -168,9 +170,9 @@ def simulated(asked: SimulateTests) -> Iso9283Simulation:
     """Run the tests of a plan on a twin, and write what is read."""
     plan, truth, corrected = asked.plan, asked.truth, asked.corrected
     rng = np.random.default_rng(asked.seed)
-    for name, given in (("plan", plan), ("corrected", corrected)):
-        if isinstance(given, str | Path):
-            path_argument(given, name)
+    for name, value in (("plan", plan), ("corrected", corrected)):
+        if isinstance(value, str | Path):
+            path_argument(value, name)
     inputs = (asked.robot, plan, truth, corrected)
     folder = None if asked.out is None else folder_for(FILES, asked.out, *inputs, ours=True)
     asked.progress("reading the plan")

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Rule
+from truearm.engine.base.errors import InputError
 from truearm.engine.base.manifest import MANIFEST
 from truearm.engine.command.texts import read_poses
 from truearm.engine.fit.design import INDICES
@@ -18,6 +18,7 @@ from truearm.engine.twin.devices import DEVICES
 from truearm.planning.choosing import ERROR
 from truearm.studio import words
 from truearm.studio.arrows import coloured
+from truearm.studio.evaluated_with import OTHER_SETTINGS
 from truearm.studio.pages.fields import NONE, Fields, offer
 from truearm.studio.pages.jog import JogPage
 from truearm.studio.pictures import Picture, report_figures
@@ -34,14 +35,6 @@ _WAYS: Final = (214, 140, 60)
 _LANGUAGES: Final = ("rapid", "krl", "fanuc", "urscript", "inform", "val3")
 _FILES: Final = (".yaml", ".yml")
 _NONE_YET: Final = "There is no plan of this window yet."
-
-
-OTHER_PLAN_SETTINGS: Final = Rule(
-    "other-plan-settings",
-    "warning",
-    "the plan that stands there was made with other fields, robot, program, constraints, payload or data than are "
-    "chosen, or files have changed since; or its record does not tell",
-)
 
 
 class PlanPage:
@@ -115,7 +108,7 @@ class PlanPage:
             offer(self._file, names, value if value in names else names[0], None)
         told = other_plan_told(self._window.project, self._table())
         self._other.visible = bool(told)
-        self._other.content = words.notice(OTHER_PLAN_SETTINGS(told)) if told else ""
+        self._other.content = words.notice(OTHER_SETTINGS(told)) if told else ""
         stands = self._stands()
         elsewhere = f"The plan in {stands[0]} was not made in this window: its report says what it is good for."
         self._said.content = words.paragraph(_NONE_YET if stands[1] is None else elsewhere)

@@ -10,10 +10,10 @@ from typing import Any, ClassVar, Final
 from truearm.calibration.result import RESULT_FILES
 from truearm.engine.base.errors import InputError, Notice
 from truearm.engine.base.files import exists, read_text
-from truearm.engine.base.units import said_of
+from truearm.engine.base.units import mark_lines
 from truearm.engine.data.excluded import read_exclusions
 from truearm.studio import words
-from truearm.studio.evaluated_with import OTHER_MEASUREMENTS, OTHER_ROBOT, OTHER_SETTINGS
+from truearm.studio.evaluated_with import OTHER_ROBOT, OTHER_SETTINGS
 from truearm.studio.made_with import MadeWith, made_with
 from truearm.studio.pages.error_arrows import ErrorArrows
 from truearm.studio.pages.fields import NONE, offer
@@ -67,7 +67,7 @@ class ProofPage:
             return
         result = _read_result(folder / "result.json")
         try:
-            made, marks = made_with(result, self._window.calibrated()), said_of(result.get("simulated_parts", ()))
+            made, marks = made_with(result, self._window.calibrated()), mark_lines(result.get("simulated_parts", ()))
             about = [*marks, f"Of {made.line()}.", f"Status: {result['status']}"]
             shown_figures = words.lines(about) + figures_table(result)
             warnings = [Notice(one["code"], one["message"], one["level"]) for one in result.get("warnings", ())]
@@ -105,13 +105,13 @@ class ProofPage:
             digest = hashlib.sha256(data.read_bytes()).hexdigest()[:12]
             if f"sha256 {digest}" not in str(result.get("history", "")):
                 text = f"This result is of other measurements than {self._window.project.settings.data} as it is now."
-                found.append(OTHER_MEASUREMENTS(text))
+                found.append(OTHER_SETTINGS(text))
         exclude = self._window.project.file("exclude")
         chosen = read_exclusions(exclude) if exclude is not None and exists(exclude) else ()
         excluded = [(one.configuration, one.target, one.reason) for one in chosen]
         if excluded != [(one["configuration"], one["target"], one["reason"]) for one in result.get("excluded", ())]:
             text = "This result is without other readings than those that are excluded now: calibrate again."
-            found.append(OTHER_MEASUREMENTS(text))
+            found.append(OTHER_SETTINGS(text))
         return found
 
     def _draw(self) -> None:

@@ -91,10 +91,10 @@ def _matrix(place: dict[str, list[float]]) -> Array:
     x, y, z = (v / 1e3 for v in place.get("translation", (0.0, 0.0, 0.0)))
     q = np.array(place.get("quaternion", (1.0, 0.0, 0.0, 0.0)), float)
     w, i, j, k = (q / np.linalg.norm(q)).tolist()
-    made = np.eye(4)
-    made[:3, :3] = Transform((0.0, 0.0, 0.0), (w, i, j, k)).rotation
-    made[:3, 3] = x, y, z
-    return made
+    matrix = np.eye(4)
+    matrix[:3, :3] = Transform((0.0, 0.0, 0.0), (w, i, j, k)).rotation
+    matrix[:3, 3] = x, y, z
+    return matrix
 
 
 def largest_reach(robot: Robot) -> float:

@@ -43,17 +43,17 @@ def main() -> None:
     parser.add_argument("--check", action="store_true", help="compare with the file that is there")
     given = parser.parse_args()
     stored = Path(__file__).with_name("outside") / f"{given.robot}.yaml"
-    made = text(given, stored.read_text("utf-8") if stored.is_file() else "")
+    content = text(given, stored.read_text("utf-8") if stored.is_file() else "")
     if not given.check:
-        sys.stdout.write(made)
-    elif not same_poses(made, stored.read_text("utf-8")):
+        sys.stdout.write(content)
+    elif not same_poses(content, stored.read_text("utf-8")):
         sys.exit(f"{stored} has other poses than {given.urdf}")
 
 
-def same_poses(one: str, other: str) -> bool:
+def same_poses(first: str, other: str) -> bool:
     """Return whether two files have the same joint positions and poses."""
     numbers = [
-        [float(v) for v in re.findall(r"-?[0-9.]+(?:e-?[0-9]+)?", text.split("poses:")[1])] for text in (one, other)
+        [float(v) for v in re.findall(r"-?[0-9.]+(?:e-?[0-9]+)?", text.split("poses:")[1])] for text in (first, other)
     ]
     return len(numbers[0]) == len(numbers[1]) and max(abs(a - b) for a, b in zip(*numbers, strict=True)) <= SAME
 

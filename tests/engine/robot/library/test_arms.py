@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 from tests.engine.robot.library import outside, outside_poses
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 from truearm.engine.robot.controller import AS_THE_MODEL
 from truearm.engine.robot.conventions.convention import parallel_joints_without_beta
@@ -111,8 +111,8 @@ def limits_and_speeds_are_those_of_an_arm(robot: Robot) -> None:
 
 def forward_and_inverse_agree(robot: Robot) -> None:
     q = robot.random_configurations(10, np.random.default_rng(1))
-    found = robot.inverse(*robot.forward(q))
-    positions, rotations = robot.forward(found.joints)
+    solution = robot.inverse(*robot.forward(q))
+    positions, rotations = robot.forward(solution.joints)
     expected = robot.forward(q)
     assert_allclose(positions, expected[0], rtol=0, atol=1e-8)
     assert_allclose(rotations, expected[1], rtol=0, atol=1e-7)
@@ -122,8 +122,8 @@ def a_urdf_of_it_is_the_same_arm(robot: Robot, path: Path) -> None:
     path.write_text(urdf_text(robot)[0], encoding="utf-8")
     again = read_urdf(path)
     q = robot.random_configurations(10, np.random.default_rng(2))
-    for one, other in zip(again.forward(q), robot.forward(q), strict=True):
-        assert_allclose(one, other, rtol=0, atol=1e-9)
+    for first, other in zip(again.forward(q), robot.forward(q), strict=True):
+        assert_allclose(first, other, rtol=0, atol=1e-9)
     for one_joint, joint in zip(again.joints, robot.joints, strict=True):
         assert_allclose(one_joint.range, joint.range, rtol=0, atol=1e-9)
         assert one_joint.max_speed == joint.max_speed
@@ -151,8 +151,8 @@ def its_truths_are_near(robot: Robot) -> None:
 def test_titles_are_unlike_and_invented_numbers_say_so() -> None:
     robots = [load_robot(robot_id) for robot_id in library()]
     assert len({robot.title for robot in robots}) == len(robots)
-    told = (load_robot("li3").source, load_robot("li3").title, load_robot("lrmate200ic").truths["invented"].source)
-    assert all("invented" in text.lower() for text in told)
+    texts = (load_robot("li3").source, load_robot("li3").title, load_robot("lrmate200ic").truths["invented"].source)
+    assert all("invented" in text.lower() for text in texts)
 
 
 def test_every_arm_is_held_against_something_outside() -> None:
@@ -219,8 +219,8 @@ def test_the_crx_counts_as_the_examples_of_abbes_and_poisson_do() -> None:
         ((14.478, 11.999, -29.780, 0, -60.220, 55.522), (600, 0, 100), (-180, 0, 70)),
     ):
         q = robot.controller.to_model(np.radians([joints]))
-        found, R = robot.forward(q, frame="controller")
-        assert_allclose(found[0] * 1e3, position, atol=0.01)  # the joints of the last have three digits
+        result, R = robot.forward(q, frame="controller")
+        assert_allclose(result[0] * 1e3, position, atol=0.01)  # the joints of the last have three digits
         w, p, r = np.radians(angles)
         about_x, about_y, about_z = (rotation_from_vector(v) for v in np.diag([w, p, r]))
         assert_allclose(R[0], about_z @ about_y @ about_x, atol=3e-5)
@@ -260,7 +260,7 @@ def test_gofa_reaches_as_far_as_its_name_says() -> None:
 def test_a_reach_that_is_none_is_refused(entry: str, said: str, tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(re.sub("(?m)^reach: .*$", f"reach: {entry}", robot_text(load_robot("irb120"))), "utf-8")
-    with refused(said):
+    with refusing(said):
         read_robot(path)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.engine.robot.refusing import refused
+from tests.expecting import refusing
 
 import truearm
 from truearm.engine.robot.library import close_names, library, load_robot, urdf_source
@@ -14,16 +14,16 @@ from truearm.engine.robot.urdf_writing import urdf_text
 
 
 def test_the_list_tells_maker_reach_joints_and_whether_the_controller_is_known() -> None:
-    found = truearm.robots()
-    head, *rows = found.lines()
+    result = truearm.robots()
+    head, *rows = result.lines()
     assert head.split() == ["id", "maker", "joints", "reach", "controller", "robot"]
     assert len(rows) == len(library())
-    told = {row.split()[0]: row for row in rows}
-    assert told["irb1600"].split(maxsplit=6) == ["irb1600", "ABB", "6", "1450", "mm", "known", "IRB 1600-6/1.45"]
-    assert told["li3"].split(maxsplit=5)[:5] == ["li3", "-", "3", "-", "-"]
-    (one,) = (row for row in found.summary()["robots"] if row["id"] == "ur10e")
-    assert one.pop("source").startswith("Universal Robots")
-    assert one == {
+    by_name = {row.split()[0]: row for row in rows}
+    assert by_name["irb1600"].split(maxsplit=6) == ["irb1600", "ABB", "6", "1450", "mm", "known", "IRB 1600-6/1.45"]
+    assert by_name["li3"].split(maxsplit=5)[:5] == ["li3", "-", "3", "-", "-"]
+    (entry,) = (row for row in result.summary()["robots"] if row["id"] == "ur10e")
+    assert entry.pop("source").startswith("Universal Robots")
+    assert entry == {
         "id": "ur10e",
         "maker": "Universal Robots",
         "title": "Universal Robots UR10e",
@@ -33,8 +33,13 @@ def test_the_list_tells_maker_reach_joints_and_whether_the_controller_is_known()
         "reach_to": "wrist-centre",
         "controller_known": True,
     }
-    (one,) = (row for row in found.summary()["robots"] if row["id"] == "li3")
-    assert (one["maker"], one["reach_mm"], one["reach_from"], one["controller_known"]) == (None, None, None, False)
+    (entry,) = (row for row in result.summary()["robots"] if row["id"] == "li3")
+    assert (entry["maker"], entry["reach_mm"], entry["reach_from"], entry["controller_known"]) == (
+        None,
+        None,
+        None,
+        False,
+    )
 
 
 def test_a_close_name_is_refused_and_all_it_may_be_are_offered() -> None:
@@ -53,21 +58,21 @@ def test_a_close_name_is_refused_and_all_it_may_be_are_offered() -> None:
     ):
         assert close_names(text)[: len(offered)] == offered
         titles = [f"{name} ({load_robot(name).title})" for name in offered]
-        with refused(*titles or ["Run 'truearm robots'"], of=text):
+        with refusing(*titles or ["Run 'truearm robots'"], of=text):
             load_robot(text)
     assert len(close_names("ur")) == 8
 
 
 def test_a_file_or_a_folder_that_is_not_there_is_said_to_be_so_and_no_robot_too(tmp_path: Path) -> None:
-    for given, said in (
+    for value, words in (
         ("ur5e.yaml", "no such file"),
         ("LR Mate 200iD/7L.yaml", "no such file"),
         (tmp_path / "ur5e", "no such file"),
         ("", "robot: no robot is given"),
         (" ", "robot: no robot is given"),
     ):
-        with refused(said, of=given):
-            load_robot(given)
+        with refusing(words, of=value):
+            load_robot(value)
 
 
 def test_the_list_is_narrowed() -> None:
@@ -80,8 +85,8 @@ def test_the_list_is_narrowed() -> None:
         ({"maker": "UR", "text": "10"}, ["ur10", "ur10e"]),
         ({"axes": 3}, ["li3"]),
     ]
-    for given, found in narrowed:
-        assert [robot.name for robot in truearm.robots(**given).robots] == found, given
+    for value, result in narrowed:
+        assert [robot.name for robot in truearm.robots(**value).robots] == result, value
 
 
 @pytest.mark.parametrize(
@@ -98,7 +103,7 @@ def test_the_list_is_narrowed() -> None:
     ],
 )
 def test_a_list_of_none_is_refused(given: dict[str, Any], parameter: str, words: str) -> None:
-    with refused(words, parameter=parameter):
+    with refusing(words, parameter=parameter):
         truearm.robots(**given)
 
 
@@ -147,5 +152,5 @@ def test_a_path_with_a_hash_is_a_path(tmp_path: Path) -> None:
     path.write_text(urdf_text(load_robot("li3"))[0])
     for text in (path, f"{path}#tool0"):
         assert len(load_robot(text).joints) == 3
-    with refused("there is no link of this name; got 'tool'"):
+    with refusing("there is no link of this name; got 'tool'"):
         load_robot(f"{path}#tool")

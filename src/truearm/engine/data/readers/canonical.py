@@ -24,10 +24,10 @@ from truearm.engine.data.readers.rows import (
     before_each,
     check_mark,
     dataset_of,
-    found_configurations,
     order_of,
     order_of_labels,
     roles_of,
+    row_configurations,
     same_everywhere,
     scale_sigma_of,
     visits_of,
@@ -51,8 +51,8 @@ def check_lengths(cells: Cells, readings: Readings, places: Mapping[str, int]) -
         lengths["distance"] = readings.distance
     if readings.height is not None:
         lengths["height"] = readings.height
-    held = [position, *(np.isfinite(values) for values in lengths.values())]
-    for row in np.flatnonzero(np.sum(held, axis=0) > 1).tolist():
+    present = [position, *(np.isfinite(values) for values in lengths.values())]
+    for row in np.flatnonzero(np.sum(present, axis=0) > 1).tolist():
         raise InputError(
             "the row holds more than one reading",
             where=f"{readings.source}, line {readings.lines[row]}",
@@ -122,14 +122,14 @@ def read_setup(cells: Cells, columns: Mapping[str, tuple[int, str]], data: Datas
     distance, height, sigma = numbers("distance"), numbers("height"), numbers("sigma", deviation=True)
     for row, (name, other) in enumerate(zip(names, others, strict=True)):
         where = f"{cells.source}, line {cells.lines[row]}"
-        placed, apart, over = (bool(np.isfinite(one[row]).any()) for one in (position, distance, height))
-        for one in filter(None, (name, other)):
-            if one not in data.fixtures:
-                near = nearest_names(one, data.fixtures)
+        placed, apart, over = (bool(np.isfinite(values[row]).any()) for values in (position, distance, height))
+        for point in filter(None, (name, other)):
+            if point not in data.fixtures:
+                near = nearest_names(point, data.fixtures)
                 raise InputError(
                     "nothing is measured against this fixture",
-                    where=f"{where}, column {'target' if one == name else 'fixture'}",
-                    came=one,
+                    where=f"{where}, column {'target' if point == name else 'fixture'}",
+                    came=point,
                     allowed=", ".join(data.fixtures) or "no row names a fixture",
                     cure=f"Did you mean {' or '.join(near)}?" if near else "Remove the row.",
                 )
@@ -243,14 +243,12 @@ def read_csv(path: Path) -> Dataset:
     joints_are, names = joint_names(columns, f"{path}, line {header}")
     joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"].place)
-    configurations = found_configurations(
-        cells, labels, [j.place for j in joints], [j.unit for j in joints], joints_are
-    )
+    configurations = row_configurations(cells, labels, [j.place for j in joints], [j.unit for j in joints], joints_are)
 
     def numbers(*names: str, deviation: bool = False) -> Array:
-        found = [columns[name] for name in names]
+        wanted = [columns[name] for name in names]
         return np.column_stack(
-            [cells.numbers(column.place, column.unit, missing=True, deviation=deviation) for column in found]
+            [cells.numbers(column.place, column.unit, missing=True, deviation=deviation) for column in wanted]
         )
 
     role = columns["role"].place if "role" in columns else None
@@ -360,14 +358,14 @@ def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
             raise InputError(
                 f"the column {name} is missing", where=where, allowed=_ALLOWED, cure=f"Add {_SHOWN[name]}."
             )
-    there = [name for name in _QUATERNION if name in columns]
-    if there and len(there) < 4:
+    present = [name for name in _QUATERNION if name in columns]
+    if present and len(present) < 4:
         raise InputError(
             "the quaternion is not complete",
             where=where,
-            came=", ".join(there),
+            came=", ".join(present),
             allowed="qw, qx, qy, qz, or none of them",
-            cure=f"Add {', '.join(n for n in _QUATERNION if n not in there)}.",
+            cure=f"Add {', '.join(n for n in _QUATERNION if n not in present)}.",
         )
     for needed, group in ((_FORCE, (*_FORCE, *_MOMENT)), (_MOMENT, _MOMENT)):
         if any(name in columns for name in group):
@@ -379,7 +377,7 @@ def _refuse_missing(cells: Cells, columns: dict[str, _Column]) -> None:
                         allowed=f"{', '.join(_SHOWN[n] for n in needed)}, or none of them",
                         cure=f"Add {_SHOWN[name]}; it may be zero.",
                     )
-    if "sigma_rot" in columns and not there:
+    if "sigma_rot" in columns and not present:
         raise InputError(
             "the column sigma_rot is there, and no orientation",
             where=where,
@@ -421,7 +419,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
             row += [cell for _, cells_of in columns for cell in cells_of(part, role, reading)]
             row += [_shown(float(values[configuration]), "1") for values in circumstances.values()]
             rows[configuration].append(row + mark)
-    unmeasured = next((label for label, found in zip(dataset.labels, rows, strict=True) if not found), None)
+    unmeasured = next((label for label, readings in zip(dataset.labels, rows, strict=True) if not readings), None)
     if unmeasured is not None:
         raise InputError(
             "a configuration without a reading cannot be written to a file",
@@ -435,7 +433,7 @@ def csv_text(dataset: Dataset, length_unit: str = "mm", angle_unit: str = "deg")
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*before, *(heading for headings, _ in columns for heading in headings), *behind])
-    writer.writerows(row for found in rows for row in found)
+    writer.writerows(row for readings in rows for row in readings)
     return stream.getvalue()
 
 
@@ -473,23 +471,23 @@ def _reading_columns(dataset: Dataset, parts: Sequence[Dataset], unit: str) -> l
         (positions, [f"{axis} [{unit}]" for axis in _POSITION], numbers("position", unit, 3)),
         (oriented, _QUATERNION, numbers("quaternion", "1", 4)),
         *((True, [f"{name} [{unit}]"], numbers(name, unit, 1)) for name in lengths),
-        (any(one is setup or one.sigma is not None for one in every), [f"sigma [{unit}]"], numbers("sigma", unit, 1)),
+        (any(p is setup or p.sigma is not None for p in every), [f"sigma [{unit}]"], numbers("sigma", unit, 1)),
         (any(part.sigma_rot is not None for part in parts), ["sigma_rot [mrad]"], numbers("sigma_rot", "mrad", 1)),
         (dataset.scale_sigma is not None, [_SHOWN["scale_sigma"]], scale),
     ]
-    return [(headings, cells) for there, headings, cells in columns if there]
+    return [(headings, cells) for shown, headings, cells in columns if shown]
 
 
 def _order_beside_labels(dataset: Dataset) -> list[str] | None:
     """Return the place of each configuration in the order of measurement, None if it is not known or labels tell it."""
     if dataset.number is None:
         return None
-    told = order_of_labels(dataset.labels)
-    if told is not None and np.array_equal(before_each(told), dataset.number):
+    order = order_of_labels(dataset.labels)
+    if order is not None and np.array_equal(before_each(order), dataset.number):
         return None
     places = [str(int(number) + 1) for number in dataset.number.tolist()]
-    is_one = len(set(places)) == len(places) and bool((dataset.number == np.floor(dataset.number)).all())
-    return places if is_one and dataset.number.min() >= 0 and dataset.number.max() < _LAST_PLACE else None
+    is_order = len(set(places)) == len(places) and bool((dataset.number == np.floor(dataset.number)).all())
+    return places if is_order and dataset.number.min() >= 0 and dataset.number.max() < _LAST_PLACE else None
 
 
 def _cells(values: Array | None, reading: int, unit: str, count: int) -> list[str]:

@@ -56,12 +56,12 @@ class Cells:
     absent: tuple[str, ...] | None = None
     sheet: str | None = None  #: Sheet of a workbook that they come from; None for a text.
 
-    def some(self, kept: Sequence[bool]) -> Cells:
+    def some(self, selected: Sequence[bool]) -> Cells:
         """Return some of the rows."""
         return replace(
             self,
-            lines=tuple(compress(self.lines, kept)),
-            columns=tuple(tuple(compress(column, kept)) for column in self.columns),
+            lines=tuple(compress(self.lines, selected)),
+            columns=tuple(tuple(compress(column, selected)) for column in self.columns),
         )
 
     @property
@@ -136,10 +136,10 @@ class Cells:
     def values(self, column: int) -> Array:
         """Return a column of numbers of any size without a unit, ``(rows,)``, NaN where nothing is."""
         swapped = (cell.translate(_SWAPPED) if self.decimal == "," else cell for cell in self.columns[column])
-        found = [math.nan if cell in ("", *self._absent) else as_number(cell) for cell in swapped]
-        if None in found:
-            raise self._not_a_number(found.index(None), column, missing=True)
-        return np.array(found, dtype=float)
+        numbers = [math.nan if cell in ("", *self._absent) else as_number(cell) for cell in swapped]
+        if None in numbers:
+            raise self._not_a_number(numbers.index(None), column, missing=True)
+        return np.array(numbers, dtype=float)
 
     def _not_a_number(self, row: int, column: int, *, missing: bool) -> InputError:
         cell, where = self.columns[column][row], self.place(row, column)
@@ -214,10 +214,10 @@ def read_cells(text: str, source: str, layout: Layout) -> Cells:
         names = tuple(first[1])
         rows = []
     refuse_beyond("columns", len(names), where=f"{source}, line {first[0]}")
-    room = limit("cells") // len(names)
+    most = limit("cells") // len(names)
     for record in records:
         rows.append(record)
-        if len(rows) > room:
+        if len(rows) > most:
             refuse_beyond("cells", len(rows) * len(names), where=f"{source}, line {record[0]}")
     if not rows:
         raise InputError("the file holds a header and no rows", where=source, cure="Check that it was exported whole.")
@@ -243,7 +243,7 @@ def refuse_long(text: str, source: str, delimiter: str | None) -> None:
 
 def lines_of(text: str) -> Iterator[str]:
     """Yield lines with what ends them: unlike those of `str.splitlines` not at a form feed and its like."""
-    return (found[0] for found in _LINE.finditer(text))
+    return (match[0] for match in _LINE.finditer(text))
 
 
 def split_line(line: str) -> list[str]:
@@ -322,9 +322,9 @@ def _records(text: str, source: str, layout: Layout) -> Iterator[tuple[int, list
         return
     reader = csv.reader(lines(), delimiter=layout.delimiter, skipinitialspace=True, strict=True)
     try:
-        for found in reader:
+        for row in reader:
             record.clear()
-            cells = [cell.strip() for cell in found]
+            cells = [cell.strip() for cell in row]
             if len(cells) > 1 or (cells and cells[0]):
                 yield current, cells
     except csv.Error as error:

@@ -20,7 +20,7 @@ from truearm.engine.data.readers.rows import (
     Configurations,
     Readings,
     dataset_of,
-    found_configurations,
+    row_configurations,
     unit_quaternions,
 )
 from truearm.engine.robot.chain import Array
@@ -29,34 +29,36 @@ from truearm.engine.robot.urdf_writing import JOINT_COLUMN, joint_names
 STOP_COLUMN: Final = re.compile(r"(?P<name>approach_[1-9][0-9]{0,3})\s*(?:\[(?P<unit>[^\]]*)\])?")
 
 
-def stops_in(cells: Cells, found: Configurations) -> Configurations | None:
+def stops_in(cells: Cells, measured: Configurations) -> Configurations | None:
     """Return the joint positions of these stops, counted as those of the configurations; None where there are none.
 
     Raises:
         InputError: If some columns are missing, have no unit or are there twice, or a cell cannot be used.
     """
     where = f"{cells.source}, line {cells.header}"
-    there: dict[str, tuple[int, str]] = {}
+    columns: dict[str, tuple[int, str]] = {}
     for place, heading in enumerate(cells.names):
         match = STOP_COLUMN.fullmatch(heading)
         if match:
             at = f"{where}, column {place + 1}, {heading}"
-            if match["name"] in there:
+            if match["name"] in columns:
                 raise InputError("the column appears twice", where=at, cure="Remove one of them.")
-            there[match["name"]] = place, checked_unit(match["unit"], (*ANGLE_UNITS, *LENGTH_UNITS), at)
-    if not there:
+            columns[match["name"]] = place, checked_unit(match["unit"], (*ANGLE_UNITS, *LENGTH_UNITS), at)
+    if not columns:
         return None
-    names = [f"approach_{number}" for number in range(1, found.joints.shape[1] + 1)]
-    if {*there} != {*names}:
+    names = [f"approach_{number}" for number in range(1, measured.joints.shape[1] + 1)]
+    if {*columns} != {*names}:
         raise InputError(
             "the stops before the configurations are not those of the joints",
             where=where,
-            came=", ".join(there),
+            came=", ".join(columns),
             allowed=", ".join(names),
             cure="Give one to each joint, or leave all of them out.",
         )
-    places, units = zip(*(there[name] for name in names), strict=True)
-    return found_configurations(cells, [found.labels[at] for at in found.of_row], places, units, found.joints_are)
+    places, units = zip(*(columns[name] for name in names), strict=True)
+    return row_configurations(
+        cells, [measured.labels[at] for at in measured.of_row], places, units, measured.joints_are
+    )
 
 
 _HEADING: Final = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
@@ -82,7 +84,7 @@ def read_configurations(path: Path) -> Dataset:
     table = _table_of(path)
     if table is None:
         return read_csv(path)
-    return _unseen(table.cells, _found(table))
+    return _unseen(table.cells, _configurations(table))
 
 
 def read_stops(path: Path) -> Dataset | None:
@@ -96,7 +98,7 @@ def read_stops(path: Path) -> Dataset | None:
         InputError: If some of its columns are missing or have no unit, or a cell cannot be used.
     """
     table = _table_of(path)
-    stops = None if table is None else stops_in(table.cells, _found(table))
+    stops = None if table is None else stops_in(table.cells, _configurations(table))
     return None if table is None or stops is None else _unseen(table.cells, stops)
 
 
@@ -113,7 +115,7 @@ def _table_of(path: Path) -> _Table | None:
     """Return the table of a plan; None for a canonical CSV."""
     text = read_text(path)
     first = next((number, line) for number, line in enumerate(lines_of(text), 1) if line.strip())
-    heads = {one.strip().strip('"').partition("[")[0].strip() for one in first[1].split(",")}
+    heads = {head.strip().strip('"').partition("[")[0].strip() for head in first[1].split(",")}
     if "target" in heads or not any(JOINT_COLUMN.fullmatch(name) for name in heads):
         return None
     refuse_other_separators(text, f"{path}, line {first[0]}")
@@ -145,26 +147,26 @@ def _table_of(path: Path) -> _Table | None:
     return _Table(cells, columns, f"{path}, line {first[0]}")
 
 
-def _found(table: _Table) -> Configurations:
+def _configurations(table: _Table) -> Configurations:
     joints_are, names = joint_names(table.columns, table.where)
     places, units = zip(*(table.columns[name] for name in names), strict=True)
     labels = table.cells.texts(table.columns[_LABEL][0])
-    return found_configurations(table.cells, labels, places, units, joints_are)
+    return row_configurations(table.cells, labels, places, units, joints_are)
 
 
-def _unseen(cells: Cells, found: Configurations) -> Dataset:
+def _unseen(cells: Cells, configurations: Configurations) -> Dataset:
     """Return joint positions with a missing reading at each."""
-    n = len(found.of_row)
+    n = len(configurations.of_row)
     return dataset_of(
         Readings(
             source=cells.source,
             lines=cells.lines,
-            configuration=found.of_row,
+            configuration=configurations.of_row,
             targets=(_UNSEEN,) * n,
             reference=np.zeros(n, bool),
             position=np.full((n, 3), np.nan),
         ),
-        found,
+        configurations,
     )
 
 

@@ -181,8 +181,8 @@ class OrderEntry(Entry):
     time: Text | None = None
 
     @model_validator(mode="after")
-    def _one(self) -> OrderEntry:
-        if sum(given is not None for given in (self.by, self.column, self.columns)) != 1:
+    def _one_source(self) -> OrderEntry:
+        if sum(value is not None for value in (self.by, self.column, self.columns)) != 1:
             raise ValueError("give either by: labels, by: rows, column: NAME, or columns: [DAY, TIME]")
         if self.time is not None and self.by is not None:
             raise ValueError("time is the format of a column; name it with column:")
@@ -266,7 +266,7 @@ class ConfigurationEntry(Entry):
     each: Literal["row"] | None = None
 
     @model_validator(mode="after")
-    def _one(self) -> ConfigurationEntry:
+    def _one_source(self) -> ConfigurationEntry:
         if (self.column is None) == (self.each is None):
             raise ValueError("give either column: NAME, or each: row for one configuration a row")
         return self
@@ -406,11 +406,11 @@ class JointsEntry(Entry):
         if not self.columns:
             if self.file is None:
                 raise ValueError("give columns: for joints in the table, or file: for those of a second file")
-            given = [name for name in ("unit", "units", "are", "key", "layout") if name in self.model_fields_set]
-            if given:
+            fields = [name for name in ("unit", "units", "are", "key", "layout") if name in self.model_fields_set]
+            if fields:
                 raise InputError(
                     "without columns, the second file has the columns of the canonical CSV, which say this",
-                    came=", ".join(given),
+                    came=", ".join(fields),
                     cure="Name the columns of the joints as well, or leave this out.",
                 )
             return self

@@ -67,7 +67,7 @@ def measuring_order(
             raise InputError(
                 f"the configurations {labels[before]!r} and {labels[after]!r} "
                 f"{'were measured at the same time' if same else 'were measured in turns'}",
-                where=_where(cells, int(row[after]), places),
+                where=_place_of_row(cells, int(row[after]), places),
                 came=" ".join(cells.columns[place][int(row[after])] for place in places),
                 allowed="one configuration after the other",
                 cure=f"A configuration is one standstill: give each its own label. {_CANNOT_TELL}",
@@ -85,20 +85,20 @@ def refuse_returns(cells: Cells, labels: Sequence[str], of_row: IntArray, where:
     """Refuse a table in which a configuration comes again after another one: its rows tell no order."""
     seen: set[int] = set()
     before = -1
-    for row, found in enumerate(of_row.tolist()):
-        if found != before and found in seen:
+    for row, configuration in enumerate(of_row.tolist()):
+        if configuration != before and configuration in seen:
             raise InputError(
-                f"the configuration {labels[found]!r} comes again after another one, so the rows tell no order",
+                f"the configuration {labels[configuration]!r} comes again after another one, so the rows tell no order",
                 where=f"{cells.source}, line {cells.lines[row]}",
                 cure=f"Let something else tell it ({where}): by: labels, or column. {_CANNOT_TELL}",
             )
-        seen.add(found)
-        before = found
+        seen.add(configuration)
+        before = configuration
 
 
 def _by_labels(cells: Cells, labels: Sequence[str], of_row: IntArray, where: str) -> IntArray:
     """Return the numbers at the end of labels."""
-    rows = {int(found): row for row, found in reversed(list(enumerate(of_row.tolist())))}
+    rows = {int(configuration): row for row, configuration in reversed(list(enumerate(of_row.tolist())))}
 
     def place(index: int) -> str:
         return f"{cells.source}, line {cells.lines[rows[index]]}" if index in rows else where
@@ -106,8 +106,8 @@ def _by_labels(cells: Cells, labels: Sequence[str], of_row: IntArray, where: str
     numbers: dict[int, int] = {}
     common: str | None = None
     for index, label in enumerate(labels):
-        found = _NUMBERED.fullmatch(label)
-        if found is None or (common is not None and found["before"] != common):
+        match = _NUMBERED.fullmatch(label)
+        if match is None or (common is not None and match["before"] != common):
             raise InputError(
                 "the label does not tell the order of measurement",
                 where=place(index),
@@ -115,8 +115,8 @@ def _by_labels(cells: Cells, labels: Sequence[str], of_row: IntArray, where: str
                 allowed=f"{common if common is not None else 'the same text in all labels, such as P,'} and a number",
                 cure=_CANNOT_TELL,
             )
-        common = found["before"]
-        if (other := numbers.setdefault(int(found["number"]), index)) != index:
+        common = match["before"]
+        if (other := numbers.setdefault(int(match["number"]), index)) != index:
             raise InputError(
                 f"two labels have the same number: {labels[other]} and {label}",
                 where=place(index),
@@ -127,7 +127,7 @@ def _by_labels(cells: Cells, labels: Sequence[str], of_row: IntArray, where: str
     return np.array(list(numbers), dtype=np.intp)
 
 
-def _where(cells: Cells, row: int, places: Sequence[int]) -> str:
+def _place_of_row(cells: Cells, row: int, places: Sequence[int]) -> str:
     return " and ".join([cells.place(row, places[0]), *(cells.names[place] for place in places[1:])])
 
 
@@ -135,7 +135,7 @@ def _texts_of_moments(cells: Cells, places: Sequence[int], absent: set[str]) -> 
     """Return the text of each moment, empty where there is none; a day and a time have a blank between them."""
     if len(places) == 1:
         return ["" if text in absent else text for text in cells.columns[places[0]]]
-    made = []
+    moment_texts = []
     for row, both in enumerate(zip(*(cells.columns[place] for place in places), strict=True)):
         lacking = [place for place, text in zip(places, both, strict=True) if text in absent]
         if len(lacking) == 1:
@@ -145,8 +145,8 @@ def _texts_of_moments(cells: Cells, places: Sequence[int], absent: set[str]) -> 
                 allowed="a day and a time, or neither",
             )
         day, time = both
-        made.append("" if lacking else f"{day if cells.sheet is None else day.removesuffix(MIDNIGHT)} {time}")
-    return made
+        moment_texts.append("" if lacking else f"{day if cells.sheet is None else day.removesuffix(MIDNIGHT)} {time}")
+    return moment_texts
 
 
 def moments(cells: Cells, places: Sequence[int], entry: OrderEntry) -> Array:
@@ -164,25 +164,25 @@ def moments(cells: Cells, places: Sequence[int], entry: OrderEntry) -> Array:
         except ValueError:
             raise InputError(
                 "this is no time of the format that the mapping names",
-                where=_where(cells, row, places),
+                where=_place_of_row(cells, row, places),
                 came=text,
                 allowed="2026-11-23 14:05:09" if entry.time == "iso" else str(entry.time),
                 cure="Correct order.time in the mapping: iso, or signs of Python such as %d.%m.%Y %H:%M:%S.",
             ) from None
-    given = [row for row, text in enumerate(texts) if known[text] is not None]
-    bare = [row for row in given if (moment := known[texts[row]]) is not None and moment.tzinfo is None]
-    if bare and len(bare) < len(given):
+    rows = [row for row, text in enumerate(texts) if known[text] is not None]
+    bare = [row for row in rows if (moment := known[texts[row]]) is not None and moment.tzinfo is None]
+    if bare and len(bare) < len(rows):
         row = bare[0]
         raise InputError(
-            "this time has no time zone, and others have one", where=_where(cells, row, places), came=texts[row]
+            "this time has no time zone, and others have one", where=_place_of_row(cells, row, places), came=texts[row]
         )
     seconds = {text: math.nan if moment is None else _seconds(moment) for text, moment in known.items()}
     values = np.array([seconds[text] for text in texts])
-    if given and not entry.has_day and np.nanmax(values) - np.nanmin(values) > _HALF_A_DAY:
+    if rows and not entry.has_day and np.nanmax(values) - np.nanmin(values) > _HALF_A_DAY:
         row = int(np.nanargmax(values))
         raise InputError(
             "the times have no day and lie more than 12 hours apart, so that they may have passed midnight",
-            where=_where(cells, row, places),
+            where=_place_of_row(cells, row, places),
             came=texts[row],
             cure="Export the day as well, or let something else tell the order.",
         )
@@ -199,11 +199,11 @@ def _spans(values: Array, of_row: IntArray, count: int) -> tuple[Array, Array, I
     first, last = np.full(count, np.nan), np.full(count, np.nan)
     row_of_first = np.zeros(count, dtype=np.intp)
     for row in np.flatnonzero(np.isfinite(values)).tolist():
-        found, value = int(of_row[row]), float(values[row])
-        if not first[found] <= value:
-            first[found], row_of_first[found] = value, row
-        if not last[found] >= value:
-            last[found] = value
+        configuration, value = int(of_row[row]), float(values[row])
+        if not first[configuration] <= value:
+            first[configuration], row_of_first[configuration] = value, row
+        if not last[configuration] >= value:
+            last[configuration] = value
     return first, last, row_of_first
 
 

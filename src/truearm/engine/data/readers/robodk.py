@@ -213,8 +213,8 @@ def _refuse_other_headings(cells: Cells) -> None:
                 allowed=f"{_JOINTS} joints, the measured point, the tool point",
                 cure="Put the columns in this order. A canonical CSV needs no import.",
             )
-    found = [_NUMBERED.fullmatch(re.split(r"[\[({]", heading)[0].strip()) for heading in cells.names[:_JOINTS]]
-    numbers = [None if match is None else int(match[1]) for match in found]
+    matches = [_NUMBERED.fullmatch(re.split(r"[\[({]", heading)[0].strip()) for heading in cells.names[:_JOINTS]]
+    numbers = [None if match is None else int(match[1]) for match in matches]
     for place, (before, number) in enumerate(pairwise(numbers), 1):
         if before is not None and number is not None and number != before + 1:
             raise InputError(

@@ -40,20 +40,20 @@ def quaternions_of_angles(angles: Array, entry: AnglesEntry) -> Array:
         )
         return np.asarray(first @ second @ third if entry.axes == "moving" else third @ second @ first)
 
-    return _where_whole(angles, rotations)
+    return _complete_quaternions(angles, rotations)
 
 
 def quaternions_of_vectors(vectors: Array) -> Array:
     """Return the quaternions (w, x, y, z) of rotation vectors ``(rows, 3)`` [rad], NaN where one is missing."""
-    return _where_whole(vectors, rotation_from_vector)
+    return _complete_quaternions(vectors, rotation_from_vector)
 
 
-def _where_whole(numbers: Array, rotations: Callable[[Array], Array]) -> Array:
+def _complete_quaternions(numbers: Array, rotations: Callable[[Array], Array]) -> Array:
     whole = np.isfinite(numbers).all(axis=1)
-    made = np.full((len(numbers), 4), np.nan)
+    converted = np.full((len(numbers), 4), np.nan)
     if whole.any():
-        made[whole] = quaternion_from_rotation(rotations(numbers[whole]))
-    return made
+        converted[whole] = quaternion_from_rotation(rotations(numbers[whole]))
+    return converted
 
 
 #: Deviations of the coordinates of a reading are called uneven if they are so many times apart in half of all.
@@ -147,13 +147,13 @@ def deviations(cells: Cells, content: MappingFile, mapping: Path, name: Literal[
     """
     value = getattr(content, name)
     if value is not None:
-        one = sized_si(value.value, value.unit, f"{mapping}, {name}.value", deviation=True)
-        return np.full(len(cells.lines) * len(content.readings), one)
-    found: list[SigmaColumns | SigmaRotColumns | None] = [getattr(entry, name) for entry in content.readings]
-    if not any(found):
+        sigma = sized_si(value.value, value.unit, f"{mapping}, {name}.value", deviation=True)
+        return np.full(len(cells.lines) * len(content.readings), sigma)
+    entries: list[SigmaColumns | SigmaRotColumns | None] = [getattr(entry, name) for entry in content.readings]
+    if not any(entries):
         return None
     parts = []
-    for number, entry in enumerate(found, 1):
+    for number, entry in enumerate(entries, 1):
         if entry is None:
             parts.append(np.full(len(cells.lines), np.nan))
             continue
@@ -241,10 +241,10 @@ RADIANS_UNLIKELY: Final = Rule(
 )
 
 
-def _of_radians(large: Array, what: str, entry: str) -> Notice:
+def _of_radians(large: Array, subject: str, entry: str) -> Notice:
     rows = int(np.sum(large > _FULL_TURN))
     return RADIANS_UNLIKELY(
-        f"The angles of {what} are read as radians and go beyond a full turn in {rows} of "
+        f"The angles of {subject} are read as radians and go beyond a full turn in {rows} of "
         f"{counted(len(large), 'row')}, up to {large.max():.4g}: they look like degrees. Correct {entry} in the "
         "mapping, if they are."
     )

@@ -40,7 +40,7 @@ class Configurations:
     simulated: bool = False  #: Whether a virtual instrument read any of their rows.
 
 
-def found_configurations(
+def row_configurations(
     cells: Cells, labels: Sequence[str], columns: Sequence[int], units: Sequence[str], joints_are: JointsOf = "model"
 ) -> Configurations:
     """Gather the configurations of a table in which every row has a label and all joints.
@@ -266,8 +266,8 @@ def unit_quaternions(q: Array, source: str, lines: Sequence[int], names: str = _
             cure="Check the order of the columns, and that all digits were exported.",
         )
     rounded = np.abs(norm - 1.0) <= 1e-15
-    made: Array = np.where(np.isnan(norm)[:, None], np.nan, np.where(rounded[:, None], q, q / norm[:, None]))
-    return made
+    normalized: Array = np.where(np.isnan(norm)[:, None], np.nan, np.where(rounded[:, None], q, q / norm[:, None]))
+    return normalized
 
 
 ROLES: Final = ("target", "reference", "fixture")
@@ -307,8 +307,8 @@ def check_mark(cells: Cells, place: int) -> None:
 
 def scale_sigma_of(cells: Cells, place: int, unit: str) -> float:
     """Return the one deviation of the scale, which every row repeats."""
-    found = cells.numbers(place, unit, deviation=True)
-    other = np.flatnonzero(found != found[0])
+    values = cells.numbers(place, unit, deviation=True)
+    other = np.flatnonzero(values != values[0])
     if len(other):
         raise InputError(
             "the scale is of the instrument, and there is one of it",
@@ -316,7 +316,7 @@ def scale_sigma_of(cells: Cells, place: int, unit: str) -> float:
             came=cells.columns[place][int(other[0])],
             allowed=f"{cells.columns[place][0]}, as on line {cells.lines[0]}",
         )
-    return float(found[0])
+    return float(values[0])
 
 
 def order_of(cells: Cells, configurations: Configurations, place: int) -> IntArray:
@@ -324,19 +324,19 @@ def order_of(cells: Cells, configurations: Configurations, place: int) -> IntArr
     texts = cells.texts(place)
     of: dict[int, int] = {}
     rows: list[int] = []
-    for row, (text, found) in enumerate(zip(texts, configurations.of_row.tolist(), strict=True)):
+    for row, (text, configuration) in enumerate(zip(texts, configurations.of_row.tolist(), strict=True)):
         if not re.fullmatch("[0-9]{1,9}", text):
             raise InputError("this is no place in an order", where=cells.place(row, place), came=text, allowed=_ORDER)
-        if found == len(rows):
+        if configuration == len(rows):
             rows.append(row)
-        elif int(text) != int(texts[rows[found]]):
+        elif int(text) != int(texts[rows[configuration]]):
             raise InputError(
-                f"order differs from line {cells.lines[rows[found]]}, which has the same configuration",
+                f"order differs from line {cells.lines[rows[configuration]]}, which has the same configuration",
                 where=cells.place(row, place),
                 came=text,
-                allowed=f"{texts[rows[found]]}, as on line {cells.lines[rows[found]]}",
+                allowed=f"{texts[rows[configuration]]}, as on line {cells.lines[rows[configuration]]}",
             )
-        if of.setdefault(int(text), found) != found:
+        if of.setdefault(int(text), configuration) != configuration:
             raise InputError(
                 f"the configuration {configurations.labels[of[int(text)]]!r} has this place in the order",
                 where=cells.place(row, place),

@@ -21,7 +21,7 @@ from truearm.engine.base.units import COLUMN as SIMULATED
 from truearm.engine.data.readers.canonical import refuse_other_separators
 from truearm.engine.data.readers.cells import Cells, Layout, lines_of, read_cells, sheet_place
 from truearm.engine.data.readers.configurations import stops_in
-from truearm.engine.data.readers.rows import Configurations, found_configurations
+from truearm.engine.data.readers.rows import Configurations, row_configurations
 from truearm.engine.robot.urdf_writing import JOINT_COLUMN, joint_names
 
 #: Endings of workbooks that are read.
@@ -220,25 +220,25 @@ def _checked(sheet: Any, source: str) -> list[tuple[str, int, int, int]]:
     with sheet._get_source() as part:  # neither merged cells nor the order are told otherwise without loading it whole
         xml = part.read()
     row = 0
-    for found in _ROW.finditer(xml):
-        number = int(found[1]) if found[1].isdigit() and len(found[1]) < _DIGITS else 0
+    for match in _ROW.finditer(xml):
+        number = int(match[1]) if match[1].isdigit() and len(match[1]) < _DIGITS else 0
         refuse_beyond("rows", number, where=source)
         if number <= row:
             raise ValueError("rows are not in order")
         row = number
     at = (0, 0)
-    for found in _CELL.finditer(xml):
-        corner = _CORNER.fullmatch(found[1].decode())
-        here = (0, 0) if corner is None else (int(corner[2]), _column(corner[1]))
-        if here <= at:
+    for match in _CELL.finditer(xml):
+        corner = _CORNER.fullmatch(match[1].decode())
+        position = (0, 0) if corner is None else (int(corner[2]), _column(corner[1]))
+        if position <= at:
             raise ValueError("cells are not in order")
-        at = here
+        at = position
     merged = []
-    for found in _MERGED.finditer(xml):
-        corners = [_CORNER.fullmatch(corner) for corner in found[1].decode().split(":")]
+    for match in _MERGED.finditer(xml):
+        corners = [_CORNER.fullmatch(corner) for corner in match[1].decode().split(":")]
         if len(corners) == 2 and corners[0] and corners[1]:
             rows = sorted(int(corner[2]) for corner in corners if corner)
-            merged.append((found[1].decode(), rows[0], rows[1], _column(corners[0][1])))
+            merged.append((match[1].decode(), rows[0], rows[1], _column(corners[0][1])))
     return merged
 
 
@@ -310,7 +310,7 @@ def columns_beside_joints(
         units: The units of those that need one.
         optional: Those that may be left out.
     """
-    columns = _found_columns(cells, shown, units, _JOINTS)
+    columns = _columns_of(cells, shown, units, _JOINTS)
     joint_names(columns, f"{cells.source}, line {cells.header}")
     return _complete(cells, columns, shown, optional, _JOINTS)
 
@@ -323,10 +323,10 @@ def named_columns(
     Args:
         shown, units, optional: As for :func:`columns_beside_joints`.
     """
-    return _complete(cells, _found_columns(cells, shown, units), shown, optional)
+    return _complete(cells, _columns_of(cells, shown, units), shown, optional)
 
 
-def _found_columns(cells: Cells, shown: Mapping[str, str], units: Mapping[str, tuple[str, ...]], *more: str) -> Columns:
+def _columns_of(cells: Cells, shown: Mapping[str, str], units: Mapping[str, tuple[str, ...]], *more: str) -> Columns:
     columns: Columns = {}
     header = f"{cells.source}, line {cells.header}"
     allowed = ", ".join([*shown.values(), *more])
@@ -376,7 +376,7 @@ def configurations_of(cells: Cells, columns: Columns) -> Configurations:
     joints_are, names = joint_names(columns, f"{cells.source}, line {cells.header}")
     joints = [columns[name] for name in names]
     labels = cells.texts(columns["configuration"][0])
-    return found_configurations(cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are)
+    return row_configurations(cells, labels, [place for place, _ in joints], [unit for _, unit in joints], joints_are)
 
 
 def joints_in_file(path: Path) -> tuple[Cells, Configurations]:

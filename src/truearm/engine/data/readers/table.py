@@ -29,7 +29,7 @@ from truearm.engine.data.readers.row_values import (
     uneven_deviations,
     unlikely_radians,
 )
-from truearm.engine.data.readers.rows import Configurations, Readings, dataset_of, found_configurations, visits_of
+from truearm.engine.data.readers.rows import Configurations, Readings, dataset_of, row_configurations, visits_of
 from truearm.engine.data.readers.sheets import is_workbook, joints_in_file, read_sheet
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
@@ -92,8 +92,8 @@ def _files(table: Path, mapping: Path, joints: Path | None) -> TableFiles:
             cure="Leave it out, or name a file under joints.file in the mapping.",
         )
     beside = table if is_preset(mapping) else path
-    found = joints if joints is not None or named is None else beside.parent / named
-    return TableFiles(table, Path(mapping), content, found)
+    joints_file = joints if joints is not None or named is None else beside.parent / named
+    return TableFiles(table, Path(mapping), content, joints_file)
 
 
 def _of_joints(content: MappingFile, mapping: Path) -> JointsEntry:
@@ -107,7 +107,9 @@ def _of_joints(content: MappingFile, mapping: Path) -> JointsEntry:
     return content.joints
 
 
-def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None) -> Dataset:
+def read_noting(
+    path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None
+) -> tuple[Dataset, tuple[Notice, ...]]:
     """Read any delimited text, or a sheet of a workbook, as its mapping file (schema ``truearm-mapping/1``) says.
 
     An empty cell is a missing reading; zeros are zeros. A second file with the joints is looked for beside
@@ -119,16 +121,12 @@ def read_table(path: Path, mapping: Path, joints_are: JointsOf | None = None, jo
         joints_are: Whose joint positions they are; None for what the mapping says.
         joints: The file of the joints; None for the one that the mapping names.
 
+    Returns:
+        The data, and what they cannot hold of the table.
+
     Raises:
         InputError: If a file cannot be used, or the mapping says that the joint positions are another's.
     """
-    return read_with(_files(path, mapping, joints), joints_are)[0]
-
-
-def read_noting(
-    path: Path, mapping: Path, joints_are: JointsOf | None = None, joints: Path | None = None
-) -> tuple[Dataset, tuple[Notice, ...]]:
-    """Read a table as :func:`read_table` does, and say what data cannot hold of it."""
     return read_with(_files(path, mapping, joints), joints_are)
 
 
@@ -136,12 +134,12 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
     """Read a table with its mapping, see :func:`read_noting`."""
     path, content, mapping = files.table, files.content, files.mapping
     whose = _whose(files.of_joints.are, joints_are, f"{mapping}, joints.are")
-    cells, labels, found = _named_rows(_read(path, content.layout, f"{mapping}, layout"), content, mapping)
+    cells, labels, groups = _named_rows(_read(path, content.layout, f"{mapping}, layout"), content, mapping)
     if labels is None:
         labels = [str(number) for number in range(1, len(cells.lines) + 1)]
     of_joints = _table_of_joints(cells, files)
     configurations, of_row = _configurations(cells, labels, of_joints, files, whose, joints_are)
-    rows = _mapped(cells, labels, found, content, mapping)
+    rows = _mapped(cells, labels, groups, content, mapping)
     targets, position, quaternion = list(rows.targets), rows.position, rows.quaternion
     sigma, sigma_rot = rows.sigma, rows.sigma_rot
     entries = len(content.readings)
@@ -154,8 +152,8 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
 
     reference = _is_reference(targets, content.references, f"{mapping}, references")
     absent = np.setdiff1d(np.arange(len(configurations.labels)), of_row)
-    kept = list(dict.fromkeys(compress(targets, ~reference)))
-    added = len(absent) * len(kept)
+    measured = list(dict.fromkeys(compress(targets, ~reference)))
+    added = len(absent) * len(measured)
 
     def padded(values: Array, *, same: bool = False) -> Array:
         """Return values with those of unmeasured configurations: none, or the `same` as everywhere."""
@@ -164,8 +162,8 @@ def read_with(files: TableFiles, joints_are: JointsOf | None = None) -> tuple[Da
     readings = Readings(
         source=cells.source,
         lines=lines + [0] * added,
-        configuration=np.concatenate([configuration, np.repeat(absent, len(kept))]),
-        targets=targets + kept * len(absent),
+        configuration=np.concatenate([configuration, np.repeat(absent, len(measured))]),
+        targets=targets + measured * len(absent),
         reference=np.concatenate([reference, np.zeros(added, dtype=bool)]),
         position=padded(position),
         quaternion=None if quaternion is None else padded(quaternion),
@@ -207,28 +205,28 @@ def mapped_rows(cells: Cells, content: MappingFile, mapping: Path) -> MappedRows
     Raises:
         InputError: If a column is missing, or a cell cannot be what its column holds.
     """
-    named, labels, found = _named_rows(cells, content, mapping)
-    return _mapped(named, labels, found, content, mapping)
+    named, labels, groups = _named_rows(cells, content, mapping)
+    return _mapped(named, labels, groups, content, mapping)
 
 
 def _named_rows(
     cells: Cells, content: MappingFile, mapping: Path
 ) -> tuple[Cells, list[str] | None, dict[str, list[str]]]:
     """Return the rows that are meant, their labels, None if they have none, and what the pattern finds in names."""
-    cells, found = replace(cells, absent=tuple(content.missing)), dict[str, list[str]]()
+    cells, groups = replace(cells, absent=tuple(content.missing)), dict[str, list[str]]()
     if content.names is not None:
-        cells, found = _split_names(cells, content.names, mapping)
+        cells, groups = _split_names(cells, content.names, mapping)
     refuse_second_header(cells, content)
-    labels = found.get("configuration")
+    labels = groups.get("configuration")
     if content.configuration is not None and content.configuration.column is not None:
         labels = list(cells.texts(place_of(cells, content.configuration.column, mapping, "configuration.column")))
-    return cells, labels, found
+    return cells, labels, groups
 
 
 def _mapped(
-    cells: Cells, labels: list[str] | None, found: dict[str, list[str]], content: MappingFile, mapping: Path
+    cells: Cells, labels: list[str] | None, groups: dict[str, list[str]], content: MappingFile, mapping: Path
 ) -> MappedRows:
-    targets = _targets(cells, content, found.get("target"), mapping)
+    targets = _targets(cells, content, groups.get("target"), mapping)
     position = np.stack(
         [
             numbers_of(cells, entry.position, content.length_unit, mapping, f"readings[{number}]")
@@ -243,21 +241,21 @@ def _mapped(
 
 
 def files_read(path: Path, mapping: Path, joints: Path | None = None) -> tuple[Path, ...]:
-    """Return all files that :func:`read_table` reads."""
+    """Return all files that :func:`read_noting` reads."""
     return _files(path, mapping, joints).read
 
 
-def _whose(said: JointsOf | None, asked: JointsOf | None, where: str) -> JointsOf:
+def _whose(stated: JointsOf | None, asked: JointsOf | None, where: str) -> JointsOf:
     """Return whose joint positions they are, or refuse two answers; `where` names what says it in a file."""
-    if asked is not None and said is not None and asked != said:
+    if asked is not None and stated is not None and asked != stated:
         raise InputError(
             "the mapping says whose joint positions they are",
             parameter="joints_are",
             where=where,
-            came=f"{asked}, and in the mapping {said}",
+            came=f"{asked}, and in the mapping {stated}",
             cure="Leave one of them out.",
         )
-    return asked or said or "model"
+    return asked or stated or "model"
 
 
 def _order(cells: Cells, configurations: Configurations, of_row: IntArray, files: TableFiles) -> IntArray | None:
@@ -326,7 +324,7 @@ def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells,
     refuse_beyond("steps", pattern.programsize * sum(map(len, texts)), where=f"{mapping}, names.pattern")
     matches = [pattern.fullmatch(text) for text in texts]
     whole = [
-        match is not None and all((found or "").strip() for found in match.groupdict().values()) for match in matches
+        match is not None and all((text or "").strip() for text in match.groupdict().values()) for match in matches
     ]
     if not all(whole) and entry.others == "refuse":
         row = whole.index(False)
@@ -345,13 +343,13 @@ def _split_names(cells: Cells, entry: NamesEntry, mapping: Path) -> tuple[Cells,
             allowed=f"a pattern for names such as {texts[0]!r}",
             cure="Correct the pattern.",
         )
-    found = [match.groupdict() for match in compress(matches, whole) if match is not None]
-    kept = replace(
+    matched = [match.groupdict() for match in compress(matches, whole) if match is not None]
+    remaining = replace(
         cells,
         lines=tuple(compress(cells.lines, whole)),
         columns=tuple(tuple(compress(column, whole)) for column in cells.columns),
     )
-    return kept, {group: [names[group].strip() for names in found] for group in entry.groups}
+    return remaining, {group: [names[group].strip() for names in matched] for group in entry.groups}
 
 
 def _configurations(
@@ -386,7 +384,7 @@ def _configurations(
                 allowed=counted(len(row_labels), "row"),
                 cure="Without a key, row n is the nth configuration: name the column of labels.",
             )
-    configurations = found_configurations(table, row_labels, places, entry.unit_of_each, joints_are)
+    configurations = row_configurations(table, row_labels, places, entry.unit_of_each, joints_are)
     return configurations, _of_rows(cells, labels, configurations, table, entry.key)
 
 
@@ -426,10 +424,10 @@ def _of_rows(
     return np.array([index[label] for label in labels], dtype=np.intp)
 
 
-def _targets(cells: Cells, content: MappingFile, found: list[str] | None, mapping: Path) -> list[str]:
+def _targets(cells: Cells, content: MappingFile, names: list[str] | None, mapping: Path) -> list[str]:
     """Return the target of each reading, row by row."""
-    if found is not None:
-        return found
+    if names is not None:
+        return names
     column = content.readings[0].target_column
     if column is not None:
         return list(cells.texts(place_of(cells, column, mapping, "readings[1].target_column")))

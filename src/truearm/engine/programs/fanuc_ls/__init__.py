@@ -29,7 +29,7 @@ from typing import Final
 from truearm.engine.base.errors import InputError
 from truearm.engine.programs.fanuc_ls.instructions import Instructions, split_moves
 from truearm.engine.programs.fanuc_ls.new import motion_program, new_program
-from truearm.engine.programs.fanuc_ls.text import JOINTS, LINE_COUNT, POSE, LsFile, Position, configuration, is_one
+from truearm.engine.programs.fanuc_ls.text import JOINTS, LINE_COUNT, POSE, LsFile, Position, configuration, recognizes
 from truearm.engine.programs.program import (
     ANY_POSTURE,
     LARGEST,
@@ -51,15 +51,15 @@ _TRACKED: Final = re.compile(r"\bLINE_TRACK_SCHEDULE_NUMBER\s*:\s*0*[1-9]", re.I
 class _Positions:
     """The positions of a file, as targets."""
 
-    def __init__(self, file: LsFile, source: int, said: Instructions) -> None:
-        self._file, self._source, self._said = file, source, said
+    def __init__(self, file: LsFile, source: int, instructions: Instructions) -> None:
+        self._file, self._source, self._instructions = file, source, instructions
         self._tracked = _TRACKED.search(file.text, 0, file.instructions[0]) is not None
 
     def target(self, position: Position) -> ProgramTarget | str:
         """Return a position as a target, or why it is left as it is."""
-        number = position.number if position.number in self._said.active else ""
-        if position.fault or number in self._said.no_place:
-            return position.fault or self._said.no_place[number]
+        number = position.number if position.number in self._instructions.active else ""
+        if position.fault or number in self._instructions.no_place:
+            return position.fault or self._instructions.no_place[number]
         is_pose = position.names[0] == "X"
         values = tuple([float(text) for text in position.texts])
         if not max(map(abs, values)) <= LARGEST:
@@ -77,8 +77,8 @@ class _Positions:
                 if float(text):
                     return f"has {name} off zero, and that external axis may carry the robot"
             if frame is None or tool is None:
-                what = "user frame" if frame is None else "tool"
-                return f"is for the active {what}, and the program does not say for certain which that is"
+                kind = "user frame" if frame is None else "tool"
+                return f"is for the active {kind}, and the program does not say for certain which that is"
             read_posture = configuration(position.configuration)
             if read_posture is None:
                 return "has a CONFIG that cannot be read"
@@ -95,17 +95,17 @@ class _Positions:
             posture,
         )
 
-    def _active(self, number: str, which: int, written: str) -> str | None:
+    def _active(self, number: str, slot: int, written: str) -> str | None:
         """Return the name of a frame (0) or tool (1), None if it is not known."""
         if written not in "Ff":
             return written.lstrip("0")
-        one: str | None
-        if number in self._said.active:
-            one = self._said.active[number][which]
+        active: str | None
+        if number in self._instructions.active:
+            active = self._instructions.active[number][slot]
         else:
-            everywhere = self._said.everywhere[which]
-            one = next(iter(everywhere)) if len(everywhere) == 1 else None
-        return None if one is None else one.lstrip("0")
+            everywhere = self._instructions.everywhere[slot]
+            active = next(iter(everywhere)) if len(everywhere) == 1 else None
+        return None if active is None else active.lstrip("0")
 
 
 def read(sources: Sequence[Source]) -> Program:
@@ -122,26 +122,26 @@ def read(sources: Sequence[Source]) -> Program:
     routine = 0
     for number, source in enumerate(sources):
         file = LsFile(source)
-        said = Instructions(file, number, routine)
-        positions = _Positions(file, number, said)
+        instructions = Instructions(file, number, routine)
+        positions = _Positions(file, number, instructions)
         places: dict[str, int | None] = {}
         for position in file.taught():
             target = positions.target(position)
             if isinstance(target, str):
                 line = file.line(position.start)
-                said.skipped.append(Skipped(number, line, f"P[{position.number}] {target}"))
+                instructions.skipped.append(Skipped(number, line, f"P[{position.number}] {target}"))
                 places[position.number] = None
             else:
                 places[position.number] = len(targets)
                 targets.append(target)
         gaps = 0
-        for step in said.steps:
+        for step in instructions.steps:
             index = places.get(step.target)
             if index is None or step.via:
-                for wanted, where in ((step.target, step.target_text), (step.via, step.via_text)):
-                    if wanted and where and wanted not in places:
+                for wanted, span in ((step.target, step.target_text), (step.via, step.via_text)):
+                    if wanted and span and wanted not in places:
                         reason = f"P[{wanted}] is not among the positions of this program"
-                        said.skipped.append(Skipped(number, file.line(where[0]), reason))
+                        instructions.skipped.append(Skipped(number, file.line(span[0]), reason))
             if index is None:
                 gaps += 1
                 continue
@@ -158,9 +158,9 @@ def read(sources: Sequence[Source]) -> Program:
                 None if via is None else step.via_text,
             )
             moves.append(move)
-        routine = said.routine + gaps + 1
-        skipped += sorted(said.skipped, key=lambda entry: entry.line)
-        unknown += said.unknown
+        routine = instructions.routine + gaps + 1
+        skipped += sorted(instructions.skipped, key=lambda entry: entry.line)
+        unknown += instructions.unknown
     return Program(_NAME, tuple(sources), tuple(targets), tuple(moves), skipped=tuple(skipped), unknown=dict(unknown))
 
 
@@ -188,7 +188,7 @@ FANUC_LS: Final = Language(
     _NAME,
     (".ls",),
     ("FANUC",),
-    is_one,
+    recognizes,
     read,
     commented,
     split_moves,

@@ -107,7 +107,7 @@ class Instructions:
         for active in _ACTIVE.finditer(text, *file.instructions):
             line = text.rfind("\n", 0, active.start()) + 1
             if _COMMENT_LINE.match(text, line) is None and _is_first_group(active):
-                self.everywhere[_which(active)].add(active[3])
+                self.everywhere[_slot(active)].add(active[3])
         for statement in file.statements():
             move = _MOVE.match(text, statement.start, statement.stop)
             if move is not None:
@@ -120,7 +120,7 @@ class Instructions:
     def _skip(self, place: int, reason: str) -> None:
         self.skipped.append(Skipped(self._source, self._file.line(place), reason))
 
-    def _not_of_here(self, place: int, word: str, inside: str) -> str:
+    def _no_target(self, place: int, word: str, inside: str) -> str:
         """Skip a reference that is to no position by its number; return the empty number."""
         shown = f"{word}[{inside}]"
         if word.upper() == "P":
@@ -133,7 +133,7 @@ class Instructions:
 
     def _move(self, statement: Statement, move: re.Match[str]) -> None:
         text, stop = self._file.text, statement.stop
-        target, target_text = move[3] or self._not_of_here(move.start(2), move[4], move[5]), move.span(2)
+        target, target_text = move[3] or self._no_target(move.start(2), move[4], move[5]), move.span(2)
         via, via_text = "", None
         if move[1] in "Cc":
             second = _SECOND.match(text, move.end(), stop) or _SECOND_LINE.search(text, move.end(), stop)
@@ -142,7 +142,7 @@ class Instructions:
                 self._skip(move.start(2), "the circle has one position only")
                 target = ""
             else:
-                target = second[2] or self._not_of_here(second.start(1), second[3], second[4])
+                target = second[2] or self._no_target(second.start(1), second[3], second[4])
                 target_text = second.span(1)
         options: set[str] = set()
         plain = via_text is None and _NO_OPTION.match(text, move.end(), stop)
@@ -152,8 +152,8 @@ class Instructions:
             if number:
                 frame, tool = self.active.setdefault(number, self._holds)
                 if (frame, tool) != self._holds:
-                    held_frame, held_tool = self._holds
-                    agreed = frame if frame == held_frame else None, tool if tool == held_tool else None
+                    active_frame, active_tool = self._holds
+                    agreed = frame if frame == active_frame else None, tool if tool == active_tool else None
                     self.active[number] = agreed
         for option in options & _NO_PLACE.keys():
             self.no_place |= dict.fromkeys(filter(None, (target, via)), _NO_PLACE[option])
@@ -170,36 +170,36 @@ class Instructions:
         for active in _ACTIVE.finditer(words):
             if _is_first_group(active):
                 alone = not words[: active.start()].strip()
-                self._hold(_which(active), active[3] if alone else None)
+                self._hold(_slot(active), active[3] if alone else None)
         match = _WORD.match(words)
         word = match[1].upper() if match else ""
         if word in _JOINING:
             self.routine += 1
-            for which in (0, 1):
-                if len(self.everywhere[which]) > 1:
-                    self._hold(which, None)
+            for slot in (0, 1):
+                if len(self.everywhere[slot]) > 1:
+                    self._hold(slot, None)
         elif match and _KNOWN.match(words, match.start(1)) is None:
             self.unknown[match[1]] += 1
             self.routine += 1
         elif "CALL" in words.upper():
             self.routine += 1
 
-    def _hold(self, which: int, number: str | None) -> None:
+    def _hold(self, slot: int, number: str | None) -> None:
         frame, tool = self._holds
-        self._holds = (frame, number) if which else (number, tool)
+        self._holds = (frame, number) if slot else (number, tool)
 
 
 def _is_first_group(active: re.Match[str]) -> bool:
     return active[2] is None or "1" in re.findall(r"\d+", active[2])
 
 
-def _which(active: re.Match[str]) -> int:
+def _slot(active: re.Match[str]) -> int:
     return int(active[1].upper() == "TOOL")
 
 
 _EACH_WORD: Final = r"(?:[^\s\[\];]|\[[^\[\]\n]*\])+"
 #: Speed, termination, options that last, options that happen once.
-_REST: Final = re.compile(
+_TAIL: Final = re.compile(
     rf"[ \t]++({_EACH_WORD})[ \t]++(?:FINE|(?:CNT|CR)[ \t]*+(?:\d+|A?R\[[^\[\]\n]*\]))"
     rf"((?:[ \t]++(?:ACC[ \t]*+(?:\d+|A?R\[[^\[\]\n]*\])|PTH))*)(?:[ \t]++(?:T[AB]|D[AB])[ \t]++{_EACH_WORD})*[ \t]*+;",
     re.IGNORECASE,
@@ -245,7 +245,7 @@ class _SplitFile:
         self._raw = program.sources[source].text
         self._file = LsFile(program.sources[source])
         self._taught = {position.number: position for position in self._file.taught()}
-        self._last = max(int(found[1]) for found in _REFERRED.finditer(self._raw))
+        self._last = max(int(match[1]) for match in _REFERRED.finditer(self._raw))
         self._line_end = line_end(self._raw)
         self._added: list[str] = []
         #: Moves that stay whole.
@@ -277,10 +277,10 @@ class _SplitFile:
         return sorted(edits, key=lambda edit: edit.start)
 
     def _segment(self, move: Move) -> _Segment | None:
-        raw, rest = self._raw, _REST.fullmatch(self._file.text, move.target_text[1], move.statement[1])
-        if rest is None or _SECONDS.search(rest[1]) or move.kind == "joint":
+        raw, tail = self._raw, _TAIL.fullmatch(self._file.text, move.target_text[1], move.statement[1])
+        if tail is None or _SECONDS.search(tail[1]) or move.kind == "joint":
             return None
-        after = f"{raw[rest.start() : rest.end(1)]} CNT100{rest[2]}    ;"
+        after = f"{raw[tail.start() : tail.end(1)]} CNT100{tail[2]}    ;"
         if move.kind == "linear":
             return _Segment(raw[move.statement[0] : move.target_text[0]], "", after)
         if move.via_text is None:
@@ -305,7 +305,7 @@ class _SplitFile:
         raw, text = self._raw, self._file.text
         edits: list[Edit] = []
         shift = 0
-        carried_ends = [found.end() for found in _CARRIED_END.finditer(text, *self._file.instructions)]
+        carried_ends = [match.end() for match in _CARRIED_END.finditer(text, *self._file.instructions)]
         carried_until, first = 0, True
         for statement in self._file.statements():
             start, stop = text.rfind("\n", 0, statement.number[0]) + 1, statement.number[1]

@@ -40,7 +40,7 @@ def configuration(text: str) -> Configuration | None:
     """Return what a CONFIG means, None if it cannot be read."""
     first, *turns = text.upper().split(",")
     letters = "".join(first.split())
-    if any(letters.count(one) + letters.count(other) > 1 for one, other in _PAIRS):
+    if any(letters.count(letter) + letters.count(other) > 1 for letter, other in _PAIRS):
         return None
     if not set(letters) <= set("".join(_PAIRS)) or not all(_TURN.fullmatch(turn) for turn in turns):
         return None
@@ -87,7 +87,7 @@ _GROUP: Final = re.compile(r"\bGP(\d)\s*+:", re.IGNORECASE)
 _FIELD: Final = re.compile(rf"\b([XYZWPR]|[JE]\d)\s*+=[ \t]*+(?:{_NUMBER}[ \t]*+(mm|deg)\b)?", re.IGNORECASE)
 
 
-def is_one(text: str) -> bool:
+def recognizes(text: str) -> bool:
     """Return whether a text is a FANUC program in ASCII."""
     return _FIRST.match(text) is not None
 
@@ -138,13 +138,13 @@ class LsFile:
         self._source = source
         self.text = source.text.replace("\r", "\n")
         self._lines = Lines(source.text)
-        if not is_one(self.text):
+        if not recognizes(self.text):
             raise InputError("there is no section /PROG", where=source.where(1), cure="Is this an LS file?")
         places: dict[str, tuple[int, int]] = {}
         wanted = ["MN", "POS", "END"]
-        for found in _SECTION.finditer(self.text):
-            if wanted and found[1].upper() == wanted[0]:
-                places[wanted.pop(0)] = (found.start() + 1, found.end())
+        for match in _SECTION.finditer(self.text):
+            if wanted and match[1].upper() == wanted[0]:
+                places[wanted.pop(0)] = (match.start() + 1, match.end())
         if wanted:
             raise InputError(
                 f"there is no section /{wanted[0]}",
@@ -166,16 +166,16 @@ class LsFile:
     def statements(self) -> Iterator[Statement]:
         """Yield the instructions of /MN."""
         number, start, stop = (0, 0), -1, -1
-        for found in _LINE.finditer(self.text, *self.instructions):
-            digits, words = found[1], found[2].rstrip()
+        for match in _LINE.finditer(self.text, *self.instructions):
+            digits, words = match[1], match[2].rstrip()
             if start >= 0 and digits:
                 yield Statement(number, start, stop)
                 start = -1
             if start < 0:
                 if digits is None:
                     continue
-                number, start = found.span(1), found.start(2)
-            stop = found.start(2) + len(words)
+                number, start = match.span(1), match.start(2)
+            stop = match.start(2) + len(words)
             if words.endswith(";"):
                 yield Statement(number, start, stop)
                 start = -1
@@ -192,12 +192,12 @@ class LsFile:
             seen.add(position.number)
             yield position
             place = position.stop
-        rest = self.text[place:stop].lstrip(" \t\n;")
-        if rest:
+        tail = self.text[place:stop].lstrip(" \t\n;")
+        if tail:
             raise InputError(
                 "this is no complete position",
-                where=self.where(stop - len(rest)),
-                came=rest[:40].partition("\n")[0],
+                where=self.where(stop - len(tail)),
+                came=tail[:40].partition("\n")[0],
                 allowed="P[number]{ data };",
             )
 
@@ -229,15 +229,15 @@ class LsFile:
 
     def _with_numbers(self, position: Position, start: int, stop: int) -> Position:
         fields: dict[str, re.Match[str]] = {}
-        for found in _FIELD.finditer(self.text, start, stop):
-            name = found[1].upper()
+        for match in _FIELD.finditer(self.text, start, stop):
+            name = match[1].upper()
             if name in fields:
                 return position._replace(fault=f"has {name} twice")
-            if found[2] is None:
-                untaught = self.text.startswith("*", found.end())
+            if match[2] is None:
+                untaught = self.text.startswith("*", match.end())
                 fault = f"is not taught: {name} is ****" if untaught else f"has a {name} without mm or deg"
                 return position._replace(fault=fault)
-            fields[name] = found
+            fields[name] = match
         joints = sum(name[0] == "J" for name in fields)
         if joints and not fields.keys().isdisjoint(_POSE):
             return position._replace(fault="has a pose and joints")
@@ -253,7 +253,7 @@ class LsFile:
             texts=[fields[name][2] for name in names],
             places=tuple(fields[name].span(2) for name in names),
             units=units,
-            external=[(name, found[2]) for name, found in fields.items() if name[0] == "E"],
+            external=[(name, field[2]) for name, field in fields.items() if name[0] == "E"],
         )
 
 

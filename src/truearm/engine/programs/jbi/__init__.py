@@ -65,7 +65,7 @@ _BEGINNING: Final = re.compile(
 )
 
 
-def is_one(text: str) -> bool:
+def recognizes(text: str) -> bool:
     """Tell whether a text is a job."""
     return JOB.search(text) is not None
 
@@ -109,7 +109,7 @@ def read(sources: Sequence[Source]) -> Program:
                 lost = [step for step in arc if step.key not in places and step.key not in barred]
                 left += [Skipped(index, step.line, _missing(step)) for step in lost]
             routine += 1
-            skipped += sorted(left, key=lambda found: found.line)
+            skipped += sorted(left, key=lambda entry: entry.line)
     return Program(
         language=JBI.name,
         sources=tuple(sources),
@@ -160,8 +160,8 @@ def _missing(step: Step) -> str:
     if step.key == NOWHERE:
         return f"{step.word}: the position is chosen when the program runs"
     table, number = step.key
-    where = "a position variable of the controller" if table == "P" else "not in the table of positions"
-    return f"{step.word} {table}{number:05d}: {where}"
+    reason = "a position variable of the controller" if table == "P" else "not in the table of positions"
+    return f"{step.word} {table}{number:05d}: {reason}"
 
 
 def _move(source: int, routine: int, arc: Sequence[Step], places: dict[Key, int]) -> Move:
@@ -225,7 +225,7 @@ JBI: Final = Language(
     "INFORM",
     (".jbi",),
     ("Yaskawa", "Motoman"),
-    is_one,
+    recognizes,
     read,
     _commented,
     split_moves,

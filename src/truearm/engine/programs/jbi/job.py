@@ -24,7 +24,7 @@ LINE: Final = re.compile(r"[^\r\n]+")
 _N: Final = rf"[ \t]*((?>{NUMBER}))[ \t]*"
 _SIX: Final = re.compile(rf"[ \t]*([CP])(\d{{1,6}})[ \t]*={_N},{_N},{_N},{_N},{_N},{_N}")
 _NAME: Final = re.compile(r"[ \t]*(BC|BP|EC|EX|C|P)(\d{1,6})[ \t]*=")
-_ONE: Final = re.compile(_N)
+_NUMBER: Final = re.compile(_N)
 _STATE: Final = re.compile(r"[ \t]*///(NPOS|TOOL|USER|POSTYPE|RCONF)(?:[ \t]+|$)")
 _COUNT: Final = re.compile(r"\d{1,6}")
 _POSTYPES: Final = ("PULSE", "ANGLE", "BASE", "ROBOT", "USER", "TOOL", "MTOOL")
@@ -73,7 +73,7 @@ class Job:
 
 def jobs_of(source: Source, lines: Lines) -> Iterator[Job]:
     """Find the jobs of a file, or refuse it."""
-    starts = [found.end() for found in JOB.finditer(source.text)]
+    starts = [match.end() for match in JOB.finditer(source.text)]
     if not starts:
         raise InputError("this is no job: it has no line /JOB", where=str(source.path))
     for start, stop in zip(starts, [*starts[1:], len(source.text)], strict=True):
@@ -87,8 +87,8 @@ def _job(source: Source, lines: Lines, start: int, stop: int) -> Job:
     positions: dict[Key, Position] = {}
     carried = False
     in_table = False
-    for found in LINE.finditer(text, start, stop):
-        begin, end = found.span()
+    for match in LINE.finditer(text, start, stop):
+        begin, end = match.span()
         six = _SIX.match(text, begin, end) if in_table else None
         if six is not None and six.end() == end:
             # Nearly every line of a large job.
@@ -97,23 +97,23 @@ def _job(source: Source, lines: Lines, start: int, stop: int) -> Job:
             table, number = six[1], int(six[2])
             name = table + six[2]
         else:
-            line = found[0].strip(" \t")
+            line = match[0].strip(" \t")
             if line.startswith("//INST") and line[6:].strip() == "":
                 break
             if line.startswith("//POS") and line[5:].strip() == "":
                 in_table = True
             if not in_table or not line or line.startswith("//POS"):
                 continue
-            said = _STATE.match(text, begin, end)
-            if said is not None:
-                value = text[said.end() : end].strip(" \t")
-                if said[1] == "NPOS":
-                    digits = _COUNT.match(text, said.end(), end)
+            state_match = _STATE.match(text, begin, end)
+            if state_match is not None:
+                value = text[state_match.end() : end].strip(" \t")
+                if state_match[1] == "NPOS":
+                    digits = _COUNT.match(text, state_match.end(), end)
                     if digits is None:
                         source.refuse(lines.number(begin), "the number of positions is missing", came=line)
                     count = digits.span()
                 else:
-                    state = _said(source, lines.number(begin), state, said[1], value)
+                    state = _next_state(source, lines.number(begin), state, state_match[1], value)
                 continue
             if line.startswith("///"):
                 continue
@@ -144,12 +144,12 @@ def _job(source: Source, lines: Lines, start: int, stop: int) -> Job:
         count = (instructions, instructions)
     steps = sum(table == "C" for table, _ in positions)
     if positions and int(text[slice(*count)]) != steps:
-        said_count = text[slice(*count)]
-        source.refuse(lines.number(count[0]), f"the job has {steps} positions C and says {said_count}")
+        stated_count = text[slice(*count)]
+        source.refuse(lines.number(count[0]), f"the job has {steps} positions C and says {stated_count}")
     return Job(start, stop, instructions, count, tuple(positions.values()), carried)
 
 
-def _said(source: Source, line: int, state: State, word: str, value: str) -> State:
+def _next_state(source: Source, line: int, state: State, word: str, value: str) -> State:
     if word == "RCONF":
         return replace(state, rconf=value)
     if word == "POSTYPE":
@@ -167,12 +167,12 @@ def _numbers(source: Source, line: int, start: int, stop: int) -> tuple[tuple[fl
     values: list[float] = []
     places: list[tuple[int, int]] = []
     while True:
-        one = _ONE.match(source.text, start, stop)
-        if one is None:
+        match = _NUMBER.match(source.text, start, stop)
+        if match is None:
             source.refuse(line, "a number is missing or malformed", came=source.text[start:stop])
-        values.append(float(one[1]))
-        places.append(one.span(1))
-        start = one.end()
+        values.append(float(match[1]))
+        places.append(match.span(1))
+        start = match.end()
         if start == stop:
             return tuple(values), tuple(places)
         if source.text[start] != ",":
@@ -244,7 +244,7 @@ class Steps:
 
 def steps_of(source: Source, lines: Lines, job: Job) -> Steps:
     """Read the instructions of a job, or refuse them if its end is missing."""
-    text, found = source.text, Steps()
+    text, steps = source.text, Steps()
     ended = shifted = False
     for line in LINE.finditer(text, job.instructions, job.stop):
         start, stop = line.span()
@@ -253,48 +253,48 @@ def steps_of(source: Source, lines: Lines, job: Job) -> Steps:
             (first, _), target_text = plain.regs[1:3]
             last = first + len(text[first:stop].rstrip(" \t"))
             key = (plain[3], int(plain[4]))
-            found.steps.append(Step(plain[1], key, first, last, target_text, lines.number(first), True, False))
+            steps.steps.append(Step(plain[1], key, first, last, target_text, lines.number(first), True, False))
             continue
         worded = _WORD.match(text, start, stop)
         if worded is None:
             if text.startswith("///GROUP", start) and (group := _GROUP.match(text, start, stop)) is not None:
-                found.robots += len(_ROBOT.findall(group[1]))
+                steps.robots += len(_ROBOT.findall(group[1]))
             elif text[start:stop].lstrip(" \t").startswith("*"):
-                found.steps.append(None)
+                steps.steps.append(None)
             continue
         word = worded[1].upper()
         if word in KINDS:
             step = _step(text, word, worded.start(1), worded.end(), stop, lines)
-            found.steps.append(step)
+            steps.steps.append(step)
             if shifted:
-                found.barred.setdefault(step.key, "is shifted by SFTON when the program runs")
+                steps.barred.setdefault(step.key, "is shifted by SFTON when the program runs")
         elif word in _INCREMENTS:
-            found.steps.append(None)
+            steps.steps.append(None)
             by = _TARGET.match(text, worded.end(), stop)
             if by is not None:
-                found.barred[by[2], int(by[3])] = f"is the increment of {word}, not a place"
+                steps.barred[by[2], int(by[3])] = f"is the increment of {word}, not a place"
         else:
             ended = ended or word == "END"
             if word in ("SFTON", "SFTOF"):
                 shifted = word == "SFTON"
             if word == "CALL":
-                found.steps.append(None)
+                steps.steps.append(None)
             if word not in _KNOWN:
-                found.unknown[word] += 1
+                steps.unknown[word] += 1
             if word != "REFP" and "P" in text[worded.end() : stop]:
-                said = _STRING.sub("", text[worded.end() : stop])
-                for used in _USED.finditer(said):
-                    found.barred.setdefault(("P", int(used[1])), f"is also used by {word}")
-                found.all_variables_barred |= _ANY_USED.search(said) is not None
+                unquoted = _STRING.sub("", text[worded.end() : stop])
+                for used in _USED.finditer(unquoted):
+                    steps.barred.setdefault(("P", int(used[1])), f"is also used by {word}")
+                steps.all_variables_barred |= _ANY_USED.search(unquoted) is not None
     if not ended:
         source.refuse(lines.number(job.stop), "the job is not complete: it has no END")
-    return found
+    return steps
 
 
 def _step(text: str, word: str, start: int, after: int, stop: int, lines: Lines) -> Step:
     stop = start + len(text[start:stop].rstrip(" \t"))
     at = _TARGET.match(text, after, stop)
-    rest = text[at.end() if at is not None else after : stop]
+    tail = text[at.end() if at is not None else after : stop]
     return Step(
         word=word,
         key=(at[2], int(at[3])) if at is not None else NOWHERE,
@@ -302,8 +302,8 @@ def _step(text: str, word: str, start: int, after: int, stop: int, lines: Lines)
         stop=stop,
         target_text=at.span(1) if at is not None else (start, start),
         line=lines.number(start),
-        alone=_OTHERS.search(rest) is None,
-        ends_arc=rest.endswith(" FPT") or " FPT " in rest,
+        alone=_OTHERS.search(tail) is None,
+        ends_arc=tail.endswith(" FPT") or " FPT " in tail,
     )
 
 

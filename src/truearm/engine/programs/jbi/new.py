@@ -40,15 +40,15 @@ def new_program(program: NewProgram) -> dict[str, str]:
     steps, state = [], ""
     for row in range(count):
         if program.poses is None or row == 0:
-            now, numbers = "///POSTYPE ANGLE\n///ANGLE", program.axes(row, ANGLES)
+            header, numbers = "///POSTYPE ANGLE\n///ANGLE", program.axes(row, ANGLES)
             steps.append(f"MOVJ C{row:05d} VJ=10.00{' PL=1' if program.blend(row) else ' PL=0'}")
         else:
-            now, numbers = f"///POSTYPE ROBOT\n///RECTAN\n///RCONF {rconf(program, row)}", program.pose(row, POSE)
+            header, numbers = f"///POSTYPE ROBOT\n///RECTAN\n///RCONF {rconf(program, row)}", program.pose(row, POSE)
             speed = max(program.speed(row) * 1e3, 0.1)
             steps.append(f"MOVL C{row:05d} V={speed:.1f}{' PL=1' if program.blend(row) else ' PL=0'}")
-        if now != state:
-            lines.append(now)
-            state = now
+        if header != state:
+            lines.append(header)
+            state = header
         lines.append(f"C{row:05d}={','.join(numbers)}")
     comments = [f"'{line[:32]}" for line in program.comments]
     lines += ["//INST", f"///DATE {DATE}", "///ATTR SC,RW", "///GROUP1 RB1", "NOP", *comments, *steps, "END", ""]
@@ -75,12 +75,12 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     def position(kind: str, row: int) -> str:
         nonlocal state, count
         if kind == "joints":
-            now, numbers = "///POSTYPE ANGLE\n///ANGLE", program.axes(row, ANGLES)
+            header, numbers = "///POSTYPE ANGLE\n///ANGLE", program.axes(row, ANGLES)
         else:
-            now, numbers = f"///POSTYPE ROBOT\n///RECTAN\n///RCONF {rconf(program, row)}", program.pose(row, POSE)
-        if now != state:
-            positions.append(now)
-            state = now
+            header, numbers = f"///POSTYPE ROBOT\n///RECTAN\n///RCONF {rconf(program, row)}", program.pose(row, POSE)
+        if header != state:
+            positions.append(header)
+            state = header
         label, count = f"C{count:05d}", count + 1
         positions.append(f"{label}={','.join(numbers)}")
         return label
@@ -113,8 +113,8 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
         arc = isinstance(step, CircleMove)
     lines = ["/JOB", f"//NAME {name}", "//POS", f"///NPOS {count},0,0,0,0,0", "///TOOL 0", *positions]
     lines += ["//INST", f"///DATE {DATE}", "///ATTR SC,RW", "///GROUP1 RB1", "NOP"]
-    told = program.comments if program.carried is None else (*program.comments, "Tool file 0 must hold this load")
-    lines += [*(f"'{line}" for line in told), *steps, "END", ""]
+    comments = program.comments if program.carried is None else (*program.comments, "Tool file 0 must hold this load")
+    lines += [*(f"'{line}" for line in comments), *steps, "END", ""]
     return {f"{name}.JBI": "\n".join(lines)}
 
 

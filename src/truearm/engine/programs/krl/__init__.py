@@ -52,7 +52,7 @@ _BEGINNING: Final = re.compile(
 )
 
 
-def is_one(text: str) -> bool:
+def recognizes(text: str) -> bool:
     """Return whether a text looks like KRL: after comments and headers it begins with a routine or a data list."""
     return _HEADER.match(text) is not None
 
@@ -71,7 +71,7 @@ KRL: Final = Language(
     name="KRL",
     suffixes=(".src", ".dat", ".sub"),
     makers=("KUKA",),
-    is_one=is_one,
+    recognizes=recognizes,
     read=read,
     comment=_commented,
     split=split_moves,

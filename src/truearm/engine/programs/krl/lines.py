@@ -197,14 +197,14 @@ def _items(text: Text, start: int, stop: int) -> tuple[dict[str, Item], str | No
         name = item[1].upper()
         if name in items:
             problem = problem or f"{name} appears twice"
-        rest = item[3]
-        if item[2] is not None and (not rest or rest.isspace()):
+        tail = item[3]
+        if item[2] is not None and (not tail or tail.isspace()):
             value = float(item[2])
             if not abs(value) <= LARGEST:
                 raise text.refusal("a number is out of all proportion", item.start(2), item[2], f"up to {LARGEST:g}")
             items[name] = value, *item.span(2)
         else:
-            items[name] = _bits(rest.strip()) if name in ("S", "T") else None, *item.span(3)
+            items[name] = _bits(tail.strip()) if name in ("S", "T") else None, *item.span(3)
     return items, problem
 
 
@@ -233,10 +233,10 @@ def _posture(status: int | None, turn: int | None) -> Configuration:
     signs = () if turn is None else tuple((i + 1, -inf, 0.0) if turn >> i & 1 else (i + 1, 0.0, inf) for i in range(6))
     if status is None:
         return Configuration(ranges=signs)
-    back, bent = bool(status & 1), bool(status & 2)
+    back, elbow_bit = bool(status & 1), bool(status & 2)
     wrist = (5, -pi, 0.0) if status & 4 else (5, 0.0, pi)
     return Configuration(
-        shoulder="back" if back else "front", elbow="up" if bent != back else "down", ranges=(wrist, *signs)
+        shoulder="back" if back else "front", elbow="up" if elbow_bit != back else "down", ranges=(wrist, *signs)
     )
 
 

@@ -333,12 +333,12 @@ class Frames:
         self._by_data: dict[FrameData, Holding] = {}
         self.tools: dict[str, Transform] = {}
         self.bases: dict[str, Transform] = {}
-        for data, found in ((TOOL_DATA, self.tools), (BASE_DATA, self.bases)):
+        for data, transforms in ((TOOL_DATA, self.tools), (BASE_DATA, self.bases)):
             listed = names.find(data, ("",))
             for index, variable in listed.elements.items() if listed and listed.elements else ():
                 numbers = _single(variable)
                 if numbers is not None:
-                    found[index] = transform(numbers)
+                    transforms[index] = transform(numbers)
 
     def set_by(self, text: Text, statement: Statement, scopes: Sequence[str]) -> Holding:
         """Return what a statement sets; its word is one of :data:`SETTERS`."""
@@ -374,17 +374,17 @@ class Frames:
         frame_data = self._names.find_frame_data(f"F{name[1:].upper()}", scopes) if name[:1] in "Xx" else None
         return self._of(frame_data) if frame_data else None
 
-    def _assigned(self, text: Text, what: str, begin: int, end: int, scopes: Sequence[str]) -> Holding:
+    def _assigned(self, text: Text, variable: str, begin: int, end: int, scopes: Sequence[str]) -> Holding:
         written = text.flat[begin:end].strip()
         by_data = _FROM_FRAME_DATA.fullmatch(written)
         if by_data:
             holding = self._by_frame_data(by_data[1], scopes)
-            if what == "$IPO_MODE":
+            if variable == "$IPO_MODE":
                 return Holding(stationary=holding.stationary)
-            return Holding(tool=holding.tool) if what == "$TOOL" else Holding(base=holding.base)
-        if what == "$IPO_MODE":
+            return Holding(tool=holding.tool) if variable == "$TOOL" else Holding(base=holding.base)
+        if variable == "$IPO_MODE":
             return Holding(stationary=written.upper() != "#BASE")
-        if what == "$TOOL":
+        if variable == "$TOOL":
             return Holding(tool=self._frame(text, TOOL_DATA, begin, end, scopes))
         return Holding(base=self._frame(text, BASE_DATA, begin, end, scopes))
 
@@ -397,29 +397,29 @@ class Frames:
         return self._of(frame_data)
 
     def _of(self, data: FrameData) -> Holding:
-        found = self._by_data.get(data)
-        if found is None:
+        holding = self._by_data.get(data)
+        if holding is None:
             tool, base = self._numbered(TOOL_DATA, data.tool), self._numbered(BASE_DATA, data.base)
-            found = self._by_data[data] = Holding(tool, base, data.stationary)
-        return found
+            holding = self._by_data[data] = Holding(tool, base, data.stationary)
+        return holding
 
     def _frame(self, text: Text, data: str, begin: int, end: int, scopes: Sequence[str]) -> Setting:
-        what, found = ("tool", self.tools) if data == TOOL_DATA else ("base", self.bases)
-        computed = Setting(problem=f"the {what} is computed")
+        kind, transforms = ("tool", self.tools) if data == TOOL_DATA else ("base", self.bases)
+        computed = Setting(problem=f"the {kind} is computed")
         flat = text.flat
         if flat[begin : begin + 1] == "{" and closing(flat, begin, end) == end:
             numbers = aggregate(text, begin, end)
             if numbers.form is not POSE or numbers.problem:
                 return computed
             values = ",".join(f"{name} {value:.10g}" for name, value in zip("XYZABC", numbers.values, strict=True))
-            name = f"${what.upper()}={{{values}}}"
-            found[name] = transform(numbers)
+            name = f"${kind.upper()}={{{values}}}"
+            transforms[name] = transform(numbers)
             return Setting(name)
         reference = REFERENCE.fullmatch(flat, begin, end)
         if reference is None or reference[3]:
             return _MOVED if _EXTERNAL.match(flat, begin, end) else computed
         key, index = reference[1].upper(), reference[2]
-        if index is None and key in _OWN and (what == "base" or key == "$NULLFRAME"):
+        if index is None and key in _OWN and (kind == "base" or key == "$NULLFRAME"):
             return Setting()
         if index is not None:
             number = number_of(literal_index(index) or "") if key == data else None
@@ -432,7 +432,7 @@ class Frames:
         numbers_or_none = _single(variable)
         if numbers_or_none is None:
             return computed
-        found[variable.name] = transform(numbers_or_none)
+        transforms[variable.name] = transform(numbers_or_none)
         return Setting(variable.name)
 
     def _bas(self, text: Text, after: int, stop: int) -> Holding:
@@ -450,11 +450,11 @@ class Frames:
         return Holding(base=self._numbered(BASE_DATA, name))
 
     def _numbered(self, data: str, name: str | None) -> Setting:
-        what = "tool" if data == TOOL_DATA else "base"
+        kind = "tool" if data == TOOL_DATA else "base"
         listed = self._names.find(data, ("",))
         element = listed.elements.get(name) if listed and listed.elements and name else None
         if name is None or (element is not None and _single(element) is None):
-            return Setting(problem=f"the {what} is computed")
+            return Setting(problem=f"the {kind} is computed")
         return Setting(name)
 
 

@@ -34,11 +34,11 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     lines = [f"DEF {program.name} ( )", *(f"  ; {line}" for line in program.comments)]
     lines += ["  BAS (#INITMOV,0)", *_carried(program.carried), "  $BASE = {X 0,Y 0,Z 0,A 0,B 0,C 0}"]
     lines += ["  $ORI_TYPE = #VAR", "  $CIRC_TYPE = #BASE", "  $ADVANCE = 3"]
-    said: dict[str, str] = {}
+    current: dict[str, str] = {}
 
     def say(name: str, value: str, axes: int = 0) -> None:
-        if said.get(name) != value:
-            said[name] = value
+        if current.get(name) != value:
+            current[name] = value
             lines.extend([f"  {name}[{axis}] = {value}" for axis in range(1, axes + 1)] or [f"  {name} = {value}"])
 
     def pose(row: int) -> str:
@@ -96,16 +96,16 @@ def new_program(program: NewProgram) -> dict[str, str]:
     """Return a ``.src`` file: straight moves have their speed ($VEL.CP), for joint motions no time can be said."""
     lines = [f"DEF {program.name} ( )", *(f"  ; {line}" for line in program.comments)]
     lines += ["  $TOOL = {X 0,Y 0,Z 0,A 0,B 0,C 0}", "  $BASE = {X 0,Y 0,Z 0,A 0,B 0,C 0}", "  $ADVANCE = 3"]
-    said = ""
+    current_speed = ""
     for row in range(len(program)):
         if program.poses is None or row == 0:
             axes = ",".join(f"A{number} {value}" for number, value in enumerate(program.axes(row, JOINTS), 1))
             lines.append(f"  PTP {{{axes}}}{' C_PTP' if program.blend(row) else ''}")
             continue
         speed = f"{program.speed(row):.4f}"
-        if speed != said:
+        if speed != current_speed:
             lines.append(f"  $VEL.CP = {speed}")
-            said = speed
+            current_speed = speed
         blend = program.blend(row) * 1e3
         if blend:
             lines.append(f"  $APO.CDIS = {blend:.3f}")

@@ -104,7 +104,7 @@ _HOME: Final = re.compile(r"XHOME\d*")
 _MOST_OFFSETS: Final = 20
 
 
-class Found(NamedTuple):
+class NamedPlace(NamedTuple):
     """A place; whether the robot ends exactly there, and whether the words are nothing but that place."""
 
     taught: Taught | None
@@ -112,7 +112,7 @@ class Found(NamedTuple):
     plain: bool = False
 
 
-_NOTHING: Final = Found(None)
+_NOTHING: Final = NamedPlace(None)
 
 
 class Finder:
@@ -127,7 +127,7 @@ class Finder:
         self._names = names
         self._skipped: dict[tuple[object, str], Skipped] = {}
         self._lists: set[tuple[int, str | None, tuple[str, str], bool, bool]] = set()
-        self._held = Holding()
+        self._holding = Holding()
         self._problem: str | None = None
         self._pair = ("", "")
         self.written: list[Taught] = []
@@ -138,29 +138,29 @@ class Finder:
         """What is left as it is."""
         return list(self._skipped.values())
 
-    def skip(self, text: Text, place: int, reason: str, what: str | None = None) -> None:
+    def skip(self, text: Text, place: int, reason: str, key: str | None = None) -> None:
         """List what is left as it is: a name once for each reason, else what stands at a place."""
         self._skipped.setdefault(
-            ((text.index, place) if what is None else what, reason), Skipped(text.index, text.line(place), reason)
+            ((text.index, place) if key is None else key, reason), Skipped(text.index, text.line(place), reason)
         )
 
     def enter(
-        self, routine: Routine, held: Holding, current: dict[int, Taught | None], *, by_axes: bool, first: bool
+        self, routine: Routine, holding: Holding, current: dict[int, Taught | None], *, by_axes: bool, first: bool
     ) -> None:
         """Take the next move.
 
         Args:
-            held: The tool and the base that it has.
+            holding: The tool and the base that it has.
             current: Which value a name has here, by the identity of its variable, if the routine gave it one.
             by_axes: Whether it heeds Status and Turn.
             first: Whether the posture before it is not known.
         """
         self._routine, self._current, self._by_axes, self._first = routine, current, by_axes, first
-        if held is not self._held:
-            self._held, self._problem = held, held.problem
-            self._pair = (held.tool.name if held.tool else "", held.base.name if held.base else "")
+        if holding is not self._holding:
+            self._holding, self._problem = holding, holding.problem
+            self._pair = (holding.tool.name if holding.tool else "", holding.base.name if holding.base else "")
 
-    def find(self, span: Span) -> Found:
+    def find(self, span: Span) -> NamedPlace:
         """Return the place that words mean."""
         text = self._routine.text
         first, *others = operands(text.flat, span)
@@ -168,7 +168,7 @@ class Finder:
             if others:
                 self.skip(text, span[0], "the place is computed: it begins with an offset")
                 return _NOTHING
-            return Found(self._write(first, None), True, True)
+            return NamedPlace(self._write(first, None), True, True)
         if len(others) > _MOST_OFFSETS:
             self.skip(text, span[0], "the place has too many offsets")
             return _NOTHING
@@ -178,7 +178,7 @@ class Finder:
         if variable is None or taught is None:
             return _NOTHING
         if not others:
-            return Found(self._use(taught), True, True)
+            return NamedPlace(self._use(taught), True, True)
         places = [second for second in seconds if second is not None and second.type in TARGET_TYPES]
         if variable.type not in TARGET_TYPES or taught.numbers.form is JOINTS or places:
             self.skip(text, span[0], "the place is computed from others")
@@ -186,9 +186,9 @@ class Finder:
         self._use(taught)
         for other in others:
             if text.flat[other[0]] != "{":
-                return Found(taught)
+                return NamedPlace(taught)
             taught = self._write(other, taught)
-        return Found(taught, True)
+        return NamedPlace(taught, True)
 
     def _write(self, span: Span, parent: Taught | None) -> Taught:
         text = self._routine.text
@@ -206,8 +206,8 @@ class Finder:
         if index is not None:
             variable.element(index).offset = True
         elif not variable.offset:
-            for one in (variable, *variable.listed):
-                one.offset = True
+            for member in (variable, *variable.listed):
+                member.offset = True
         return variable
 
     def _variable(self, span: Span) -> Variable | None:
@@ -256,9 +256,9 @@ class Finder:
         elif len(variable.values) == 1:
             return variable.values[0]
         else:
-            here = self._current.get(id(variable))
-            if here is not None:
-                return here
+            taught = self._current.get(id(variable))
+            if taught is not None:
+                return taught
             self.skip(
                 text, span[0], f"{short(name)} has several values, and which one holds here is not known", name.upper()
             )
@@ -283,8 +283,8 @@ class Finder:
         return taught
 
 
-def _same(one: tuple[str, str], other: tuple[str, str]) -> bool:
-    return (one[0].casefold(), one[1].casefold()) == (other[0].casefold(), other[1].casefold())
+def _same(first: tuple[str, str], second: tuple[str, str]) -> bool:
+    return (first[0].casefold(), first[1].casefold()) == (second[0].casefold(), second[1].casefold())
 
 
 _KINDS: Final[dict[str, MoveKind]] = {
@@ -512,13 +512,13 @@ class _Reader:
 
     def _finished_moves(self) -> list[Move]:
         moves: list[Move] = []
-        came = False
+        start_known = False
         for move in self._moves:
             if move.target.index < 0:
-                came = False
+                start_known = False
                 continue
             via = None if move.via is None or move.via.index < 0 else move.via.index
-            splittable = move.splittable and move.follows and came and (via is None) == (move.via is None)
+            splittable = move.splittable and move.follows and start_known and (via is None) == (move.via is None)
             _, start, _, stop = move.statement
             moves.append(
                 Move(
@@ -533,7 +533,7 @@ class _Reader:
                     move.via_text if splittable else None,
                 )
             )
-            came = True
+            start_known = True
         return moves
 
 

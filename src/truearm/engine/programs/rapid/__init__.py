@@ -39,7 +39,7 @@ _MODULE: Final = re.compile(
 )
 
 
-def _is_one(text: str) -> bool:
+def _recognizes(text: str) -> bool:
     return _MODULE.search(text) is not None
 
 
@@ -64,7 +64,7 @@ RAPID: Final = Language(
     name="RAPID",
     suffixes=(".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"),
     makers=("ABB",),
-    is_one=_is_one,
+    recognizes=_recognizes,
     read=_read,
     comment=_commented,
     split=split_moves,

@@ -186,8 +186,8 @@ def frame_of(text: str, start: int, stop: int) -> tuple[Transform | None, str | 
     match = _FRAME_TEXT.match(text, start, stop)
     if match is None:
         return None, None
-    held, fixed, *numbers = match.groups()
-    if held.upper() == "TRUE":
+    robhold, fixed, *numbers = match.groups()
+    if robhold.upper() == "TRUE":
         return None, "is held by the robot"
     if fixed.upper() == "FALSE":
         return None, "is moved by another mechanical unit"
@@ -211,27 +211,27 @@ class Motion(NamedTuple):
 
 
 def _motions() -> dict[str, Motion]:
-    found: dict[str, Motion] = {}
+    motions: dict[str, Motion] = {}
     for ending in ("", "do", "ao", "go", "sync"):
-        found[f"movej{ending}"] = Motion("joint", tool=3)
-        found[f"movel{ending}"] = Motion("linear", tool=3, splittable=not ending)
-        found[f"movec{ending}"] = Motion("circular", target=1, tool=4, via=0, splittable=not ending)
-    found["moveabsj"] = Motion("joint", tool=3, joints=True)
-    found["triggabsj"] = found["arcmoveabsj"] = Motion("joint", joints=True)
+        motions[f"movej{ending}"] = Motion("joint", tool=3)
+        motions[f"movel{ending}"] = Motion("linear", tool=3, splittable=not ending)
+        motions[f"movec{ending}"] = Motion("circular", target=1, tool=4, via=0, splittable=not ending)
+    motions["moveabsj"] = Motion("joint", tool=3, joints=True)
+    motions["triggabsj"] = motions["arcmoveabsj"] = Motion("joint", joints=True)
     for word in ("triggj", "triggjios", "arcmovej", "spotj", "spotmj", "dispj", "nutj"):
-        found[word] = Motion("joint")
+        motions[word] = Motion("joint")
     for word in ("triggl", "trigglios", "arcmovel", "spotl", "spotml", "displ", "capl", "paintl", "gluel", "nutl"):
-        found[word] = Motion("linear")
+        motions[word] = Motion("linear")
     for word in ("triggc", "arcmovec", "dispc", "capc", "paintc", "gluec"):
-        found[word] = Motion("circular", target=1, via=0)
+        motions[word] = Motion("circular", target=1, via=0)
     for number in ("", "1", "2"):
         for phase in ("", "start", "end"):
-            found[f"arcl{number}{phase}"] = Motion("linear", splittable=not phase)
-            found[f"arcc{number}{phase}"] = Motion("circular", target=1, via=0, splittable=not phase)
-    found["searchl"] = Motion("linear", target=2, searches=True)
-    found["searchc"] = Motion("circular", target=3, via=2, searches=True)
-    found["contactl"] = Motion("linear", searches=True)
-    return found
+            motions[f"arcl{number}{phase}"] = Motion("linear", splittable=not phase)
+            motions[f"arcc{number}{phase}"] = Motion("circular", target=1, via=0, splittable=not phase)
+    motions["searchl"] = Motion("linear", target=2, searches=True)
+    motions["searchc"] = Motion("circular", target=3, via=2, searches=True)
+    motions["contactl"] = Motion("linear", searches=True)
+    return motions
 
 
 #: By first word, in lower case.

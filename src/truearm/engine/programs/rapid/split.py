@@ -46,18 +46,18 @@ def with_postures_left_free(program: Program) -> Program:
         if not _SWITCH.search(source.text):
             continue
         code, lines = code_of(source.text)[0], Lines(source.text)
-        for found in _SWITCH.finditer(code):
-            kind = "straight" if found[1].upper() == "L" else "joint"
-            switches[kind][number].append((lines.number(found.start()), found[2].lower() == "on"))
+        for match in _SWITCH.finditer(code):
+            kind = "straight" if match[1].upper() == "L" else "joint"
+            switches[kind][number].append((lines.number(match.start()), match[2].lower() == "on"))
     if not any(places for kind in switches.values() for places in kind):
         return program
     looked: set[int] = set()
     free: set[int] = set()
     for move in program.moves:
         kind = "joint" if move.kind == "joint" else "straight"
-        here = switches[kind][move.source]
-        last = bisect_right([line for line, _ in here], move.line) - 1
-        off = last >= 0 and not here[last][1]
+        switched = switches[kind][move.source]
+        last = bisect_right([line for line, _ in switched], move.line) - 1
+        off = last >= 0 and not switched[last][1]
         (free if off else looked).update(index for index in (move.via, move.target) if index is not None)
     targets = tuple(
         replace(target, configuration=ANY_POSTURE) if index in free and index not in looked else target
@@ -121,8 +121,8 @@ def _written(
     if target.parent is None:
         place = target.places[-1]
         tail = ROBTARGET_TAIL.match(codes[target.source], place[1]) if place else None
-        rest = "".join(tail[0].split()) if tail else ""
-        return f"[[{position}],[{','.join(written(value, 7) for value in numbers[3:])}{rest}"
+        ending = "".join(tail[0].split()) if tail else ""
+        return f"[[{position}],[{','.join(written(value, 7) for value in numbers[3:])}{ending}"
     first = target.places[0]
     call = program.sources[move.source].text[move.target_text[0] : first[0] if first else None]
     turns = ""

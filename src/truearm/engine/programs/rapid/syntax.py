@@ -33,12 +33,12 @@ def code_of(text: str) -> tuple[str, int | None]:
     """
     unclosed: list[int] = []
 
-    def blank(found: re.Match[str]) -> str:
-        length = len(found[0])
-        if found[0][0] == "!":
+    def blank(match: re.Match[str]) -> str:
+        length = len(match[0])
+        if match[0][0] == "!":
             return " " * length
-        if not found[1]:
-            unclosed.append(found.start())
+        if not match[1]:
+            unclosed.append(match.start())
             return " " * length
         return f'"{" " * (length - 2)}"'
 
@@ -224,14 +224,14 @@ def arguments_of(code: str, start: int, stop: int) -> Arguments:
     return arguments
 
 
-def _put(found: Arguments, code: str, start: int, stop: int, optional: bool, after_option: bool) -> None:
+def _put(arguments: Arguments, code: str, start: int, stop: int, optional: bool, after_option: bool) -> None:
     if not optional:
         span = trimmed(code, start, stop)
         # What is empty before an optional argument is none that is missing.
         if span[0] < span[1] or not after_option:
-            found.needed.append(span)
+            arguments.needed.append(span)
     elif (name := _OPTION.match(code, start, stop)) is not None:
-        found.options[name[1].lower()] = trimmed(code, name.end(), stop)
+        arguments.options[name[1].lower()] = trimmed(code, name.end(), stop)
 
 
 _NAME: Final = r"[^\W\d]\w*+"
@@ -285,8 +285,8 @@ class _Walk:
         self.modules, self.module_place = 0, 0
         self.in_record = False
         self.stretch = 1 + (listing.instructions[-1].stretch if listing.instructions else 0)
-        one = "|".join(sorted(motions))
-        self.motion_after_if = re.compile(rf"(?<![\\.\w])(?:{one})\b(?=\s*+[^\s:(=<>,)])", re.I)
+        words = "|".join(sorted(motions))
+        self.motion_after_if = re.compile(rf"(?<![\\.\w])(?:{words})\b(?=\s*+[^\s:(=<>,)])", re.I)
 
     def run(self) -> None:
         code, start = self.code, 0
@@ -306,31 +306,31 @@ class _Walk:
     def _part(self, place: int, stop: int) -> None:
         code, local = self.code, False
         if self.in_record:
-            found = _ENDRECORD.search(code, place, stop)
-            if found is None:
+            match = _ENDRECORD.search(code, place, stop)
+            if match is None:
                 return None
-            self.in_record, place = False, found.end()
-        while found := _WORD.match(code, place, stop):
-            word, place = found[1].lower(), found.end()
+            self.in_record, place = False, match.end()
+        while match := _WORD.match(code, place, stop):
+            word, place = match[1].lower(), match.end()
             if word in self.motions:
-                return self._instruction(found, stop)
+                return self._instruction(match, stop)
             if word in ("const", "var", "pers"):
                 return self._declaration(place, stop, local)
             if word in ("local", "task"):
                 local = word == "local"
                 continue
-            if word in self.quiet and code[found.end() : found.end() + 1] != ":":
+            if word in self.quiet and code[match.end() : match.end() + 1] != ":":
                 return None
             if word in _CHANGING and (changed := _CHANGED.match(code, place, stop)):
                 return self._written(changed[1], changed[2], changed.start())
-            if word not in _PASSED and (assigned := _ASSIGNED.match(code, found.end(1), stop)):
-                return self._written(found[1], assigned[1], found.start(1))
+            if word not in _PASSED and (assigned := _ASSIGNED.match(code, match.end(1), stop)):
+                return self._written(match[1], assigned[1], match.start(1))
             # From here on the robot may be elsewhere than the instruction before has sent it.
             self.stretch += 1
             if word in _HEAD:
-                place = self._open(word, found.start(1), place, stop)
+                place = self._open(word, match.start(1), place, stop)
             elif word in ("endproc", "endfunc", "endtrap", "endmodule"):
-                self._close(word, found.start(1))
+                self._close(word, match.start(1))
             elif word == "record":
                 closed = _ENDRECORD.search(code, place, stop)
                 if closed is None:
@@ -352,7 +352,7 @@ class _Walk:
             elif colon := _COLON.match(code, place, stop):
                 place = colon.end()
             else:
-                return self._instruction(found, stop)
+                return self._instruction(match, stop)
         if code[place:stop].strip():
             self.stretch += 1
         return None
@@ -419,9 +419,9 @@ class _Walk:
             return match.end()
         self.routine, self.closing, self.opened = {}, f"end{word}", start
         self.listing.routines.add(match[1].lower())
-        for one in _PARAMETER.finditer(match[2] or ""):
-            name = one[2].lower()
-            self.routine[name] = Datum(one[1].lower(), one[2], self.source, start, parameter=True)
+        for parameter in _PARAMETER.finditer(match[2] or ""):
+            name = parameter[2].lower()
+            self.routine[name] = Datum(parameter[1].lower(), parameter[2], self.source, start, parameter=True)
         return match.end()
 
     def _close(self, word: str, place: int) -> None:

@@ -83,15 +83,15 @@ class _Kind:
 
     def defined(self) -> dict[str, Transform]:
         """Return those that the program defines and does not change, by name."""
-        found: dict[str, Transform] = {}
+        frames: dict[str, Transform] = {}
         for datum in self.unchanged():
             try:
                 transform, _ = self._read(datum)
             except RefusedPoseError:  # of one that no move uses: those that are used are refused before
                 continue
             if transform is not None:
-                found[datum.name] = transform
-        return found
+                frames[datum.name] = transform
+        return frames
 
 
 class Frames:
@@ -123,8 +123,8 @@ class Frames:
     def loads(self) -> dict[str, Payload]:
         """Return what the robot carries with each tool, by name, where the program says it."""
         codes = self._tools.listing.codes
-        found = {datum.name: load_of(codes[datum.source], datum.start, datum.stop) for datum in self._tools.unchanged()}
-        return {name: load for name, load in found.items() if load is not None}
+        loads = {datum.name: load_of(codes[datum.source], datum.start, datum.stop) for datum in self._tools.unchanged()}
+        return {name: load for name, load in loads.items() if load is not None}
 
 
 TARGET_TEXTS: Final = {"robtarget": ROBTARGET_TEXT, "jointtarget": JOINTTARGET_TEXT}
@@ -156,7 +156,7 @@ class Candidate:
     index: int = -1
 
 
-class Found(NamedTuple):
+class Meaning(NamedTuple):
     """What an expression for a target means: one target or any of several, and whether it is no more than that."""
 
     candidates: list[Candidate]
@@ -182,11 +182,11 @@ class Expressions:
         code, pattern = self.listing.codes[datum.source], TARGET_TEXTS[datum.type]
         if datum.size is None:
             match = pattern.fullmatch(code, *trimmed(code, datum.start, datum.stop))
-            made = [self._written_out(datum.source, match, datum, datum.name)]
+            candidates = [self._written_out(datum.source, match, datum, datum.name)]
         else:
-            made = self._array(datum, pattern)
-        self.elements[datum] = made
-        for candidate in made:
+            candidates = self._array(datum, pattern)
+        self.elements[datum] = candidates
+        for candidate in candidates:
             candidate.empty = datum.start == datum.stop
             if datum.twice:
                 candidate.reason = "is declared more than once"
@@ -199,48 +199,48 @@ class Expressions:
 
     def _array(self, datum: Datum, pattern: re.Pattern[str]) -> list[Candidate]:
         code = self.listing.codes[datum.source]
-        made: list[Candidate] = []
+        items: list[Candidate] = []
         sizes = _sizes(datum.size or "")
-        rest = datum.start
-        for found in pattern.finditer(code, datum.start, datum.stop):
-            if code[rest : found.start()].strip(" \t\r\n[],"):
+        end = datum.start
+        for match in pattern.finditer(code, datum.start, datum.stop):
+            if code[end : match.start()].strip(" \t\r\n[],"):
                 break
-            rest = found.end()
-            index = _index_name(len(made), sizes)
-            made.append(self._written_out(datum.source, found, datum, f"{datum.name}{{{index}}}"))
-        if made and (sizes is None or len(made) == prod(sizes)) and not code[rest : datum.stop].strip(" \t\r\n]"):
-            return made
-        del self.candidates[len(self.candidates) - len(made) :]
+            end = match.end()
+            index = _index_name(len(items), sizes)
+            items.append(self._written_out(datum.source, match, datum, f"{datum.name}{{{index}}}"))
+        if items and (sizes is None or len(items) == prod(sizes)) and not code[end : datum.stop].strip(" \t\r\n]"):
+            return items
+        del self.candidates[len(self.candidates) - len(items) :]
         return [self._written_out(datum.source, None, datum, datum.name)]
 
     def _written_out(
-        self, source: int, found: re.Match[str] | None, datum: Datum | None, name: str, joints: bool = False
+        self, source: int, match: re.Match[str] | None, datum: Datum | None, name: str, joints: bool = False
     ) -> Candidate:
         joints = datum.type == "jointtarget" if datum else joints
         form, count = (JOINTTARGET, 6) if joints else (ROBTARGET, 7)
-        if found is None:
+        if match is None:
             candidate = Candidate(source, datum.place if datum else 0, name, form)
         else:
-            groups = found.groups()
+            groups = match.groups()
             values = tuple(map(float, groups[:count]))
             posture = ANY_POSTURE if joints else configuration(*groups[7:])
-            place = datum.place if datum and datum.size is None else found.start(1)
-            candidate = Candidate(source, place, name, form, values, found.regs[1 : count + 1], posture)
+            place = datum.place if datum and datum.size is None else match.start(1)
+            candidate = Candidate(source, place, name, form, values, match.regs[1 : count + 1], posture)
             if joints and absent(values):
                 candidate.reason = "does not say where all joints of the robot are (9E9)"
-            elif not joints and external_axis_moved(found[0]):
+            elif not joints and external_axis_moved(match[0]):
                 candidate.reason = "has an external axis that is not at zero, and may carry the robot or move the work"
         self.candidates.append(candidate)
         return candidate
 
-    def target(self, at: Instruction, text: Span, joints: bool, depth: int = 0) -> Found | str:
+    def target(self, at: Instruction, text: Span, joints: bool, depth: int = 0) -> Meaning | str:
         """Return what the words for a target mean, or why they mean none that can be corrected."""
         code, (start, stop) = self.listing.codes[at.source], text
         if code.startswith("[", start, stop):
             match = (JOINTTARGET_TEXT if joints else ROBTARGET_TEXT).fullmatch(code, start, stop)
             if match is None:
                 return why_no_target(code[start:stop])
-            return Found([self._written_out(at.source, match, None, "", joints)], True)
+            return Meaning([self._written_out(at.source, match, None, "", joints)], True)
         reference = _REFERENCE.fullmatch(code, start, stop)
         if reference is not None:
             return self._reference(at, reference, "jointtarget" if joints else "robtarget")
@@ -251,7 +251,7 @@ class Expressions:
             return "is computed"
         return self._offset(at, call, stop, depth)
 
-    def _reference(self, at: Instruction, reference: re.Match[str], type: str) -> Found | str:
+    def _reference(self, at: Instruction, reference: re.Match[str], type: str) -> Meaning | str:
         name, index = reference.groups()
         datum = self.listing.find(name, at)
         if datum is None:
@@ -264,19 +264,19 @@ class Expressions:
         if (index is None) != (datum.size is None):
             return f"is not understood: {name} is {'no' if datum.size is None else 'an'} array"
         if index is None or (len(elements) == 1 and elements[0].name == datum.name):
-            return Found(elements, True)
+            return Meaning(elements, True)
         if _WHOLE.fullmatch(index) is None:
-            return Found(elements, False)
+            return Meaning(elements, False)
         wanted = f"{datum.name}{{{','.join(str(int(part.strip()[-9:])) for part in index.split(','))}}}"
         chosen = [element for element in (self._by_name(datum, elements).get(wanted),) if element is not None]
-        return Found(chosen, True) if chosen else f"is not declared in this program: {wanted}"
+        return Meaning(chosen, True) if chosen else f"is not declared in this program: {wanted}"
 
     def _by_name(self, datum: Datum, elements: list[Candidate]) -> dict[str, Candidate]:
         if datum not in self._names:
             self._names[datum] = {element.name: element for element in elements}
         return self._names[datum]
 
-    def _offset(self, at: Instruction, call: re.Match[str], stop: int, depth: int) -> Found | str:
+    def _offset(self, at: Instruction, call: re.Match[str], stop: int, depth: int) -> Meaning | str:
         code = self.listing.codes[at.source]
         arguments = arguments_of(code, call.end(), stop - 1)
         turned = call[1].lower() == "reltool"
@@ -288,12 +288,12 @@ class Expressions:
         parent = only(inner)
         numbers = self._literals(at.source, arguments, turned)
         if parent is None or not inner.exact or numbers is None:
-            return Found(inner.candidates, False)
+            return Meaning(inner.candidates, False)
         values, places = numbers
         form = RELTOOL if turned else OFFS
         candidate = Candidate(at.source, arguments.needed[1][0], "", form, values, places, parent=parent)
         self.candidates.append(candidate)
-        return Found([candidate], True)
+        return Meaning([candidate], True)
 
     def _literals(
         self, source: int, arguments: Arguments, turned: bool
@@ -308,9 +308,9 @@ class Expressions:
         return tuple(float(code[span[0] : span[1]]) if span else 0.0 for span in spans), tuple(spans)
 
 
-def only(found: Found | None) -> Candidate | None:
+def only(target: Meaning | None) -> Candidate | None:
     """Return the target that was found if it can be no other."""
-    return found.candidates[0] if found is not None and len(found.candidates) == 1 else None
+    return target.candidates[0] if target is not None and len(target.candidates) == 1 else None
 
 
 def _sizes(text: str) -> tuple[int, ...] | None:
@@ -388,7 +388,7 @@ class Finder:
             tuple(moves),
             tools,
             frames,
-            tuple(sorted(self.skipped, key=lambda one: (one.source, one.line))),
+            tuple(sorted(self.skipped, key=lambda entry: (entry.source, entry.line))),
             dict(self.unknown),
             self.frames.loads(),
             any(_LOADING.search(code) for code in self.listing.codes),
@@ -400,8 +400,8 @@ class Finder:
     def _inside(self, source: int, start: int, stop: int, reason: str) -> None:
         code = self.listing.codes[source]
         for pattern in TARGET_TEXTS.values():
-            for found in pattern.finditer(code, start, stop):
-                self._skip(source, found.start(), f"a target that is written out is left as it is: {reason}")
+            for match in pattern.finditer(code, start, stop):
+                self._skip(source, match.start(), f"a target that is written out is left as it is: {reason}")
 
     # Instructions
 
@@ -433,7 +433,7 @@ class Finder:
         if not motion.joints:
             self.uses.add(None if against else use)
         if motion.searches and len(needed) > 4:
-            self._found_in_running(at, needed[1])
+            self._mark_computed(at, needed[1])
         target_text = needed[motion.target]
         target = self._used(at, target_text, motion.joints, use, against)
         via_text = None if motion.via is None else needed[motion.via]
@@ -446,20 +446,20 @@ class Finder:
             _Pending(at, motion, only(target), only(via), exact and not motion.searches, target_text, via_text, whole)
         )
 
-    def _found_in_running(self, at: Instruction, text: Span) -> None:
+    def _mark_computed(self, at: Instruction, text: Span) -> None:
         datum = self.listing.find(self.listing.codes[at.source][slice(*text)], at)
         if datum is not None:
             line = self.listing.line(at.source, at.start)
             reason = f"gets its numbers while the program runs, in line {line}"
             self._mark(self.expressions.elements.get(datum, []), ("", ""), reason)
 
-    def _used(self, at: Instruction, text: Span, joints: bool, use: Use, against: str | None) -> Found | None:
-        found = self.expressions.target(at, text, joints)
-        if isinstance(found, str):
-            self._skip(at.source, text[0], f"the target of {at.word} {found}")
+    def _used(self, at: Instruction, text: Span, joints: bool, use: Use, against: str | None) -> Meaning | None:
+        target = self.expressions.target(at, text, joints)
+        if isinstance(target, str):
+            self._skip(at.source, text[0], f"the target of {at.word} {target}")
             return None
-        self._mark(found.candidates, use, against)
-        return found
+        self._mark(target.candidates, use, against)
+        return target
 
     def _mark(self, candidates: list[Candidate], use: Use, against: str | None) -> None:
         """Note a use of targets, and of those that they are offsets from."""
@@ -489,64 +489,68 @@ class Finder:
                     candidate.reason = (
                         candidate.reason or f"may be displaced by the program, which does so in line {self.displaced}"
                     )
-        kept = []
+        usable = []
         # A target comes after the one that it is an offset from.
-        for one in self.expressions.candidates:
-            if one.parent is not None and one.parent.reason is not None:
-                one.reason = one.reason or "is an offset from a target that is left as it is"
-            if one.use is None and one.reason is None:
-                self._use_the_only(one)
-            if one.reason is None:
-                wrong = wrong_number(one.form, one.values)
+        for candidate in self.expressions.candidates:
+            if candidate.parent is not None and candidate.parent.reason is not None:
+                candidate.reason = candidate.reason or "is an offset from a target that is left as it is"
+            if candidate.use is None and candidate.reason is None:
+                self._use_the_only(candidate)
+            if candidate.reason is None:
+                wrong = wrong_number(candidate.form, candidate.values)
                 if wrong is not None:
-                    place = next((span[0] for span in one.places if span), one.place)
-                    raise self.listing.refusal(one.source, place, wrong[0], wrong[1], wrong[2])
-                kept.append(one)
-            elif one.used or not one.empty:
-                self._skip(one.source, one.place, f"{one.name or 'a target that is written out'} {one.reason}")
-        kept.sort(key=lambda one: (one.source, one.place))
-        for index, one in enumerate(kept):
-            one.index = index
+                    place = next((span[0] for span in candidate.places if span), candidate.place)
+                    raise self.listing.refusal(candidate.source, place, wrong[0], wrong[1], wrong[2])
+                usable.append(candidate)
+            elif candidate.used or not candidate.empty:
+                self._skip(
+                    candidate.source,
+                    candidate.place,
+                    f"{candidate.name or 'a target that is written out'} {candidate.reason}",
+                )
+        usable.sort(key=lambda target: (target.source, target.place))
+        for index, candidate in enumerate(usable):
+            candidate.index = index
         line = self.listing.line
         return [
             ProgramTarget(
-                one.source, line(one.source, one.place), one.name, one.form, one.values, one.places,
-                *(one.use or ("", "")), one.configuration, one.parent.index if one.parent else None,
-                one.form is RELTOOL,
+                target.source, line(target.source, target.place), target.name, target.form, target.values,
+                target.places, *(target.use or ("", "")), target.configuration,
+                target.parent.index if target.parent else None, target.form is RELTOOL,
             )
-            for one in kept
+            for target in usable
         ]  # fmt: skip
 
-    def _use_the_only(self, one: Candidate) -> None:
-        if one.form is JOINTTARGET and len(self.tools) == 1 and (tool := next(iter(self.tools))) is not None:
-            one.use = (tool, "")
-        elif one.form is ROBTARGET and len(self.uses) == 1 and (use := next(iter(self.uses))) is not None:
-            one.use = use
+    def _use_the_only(self, candidate: Candidate) -> None:
+        if candidate.form is JOINTTARGET and len(self.tools) == 1 and (tool := next(iter(self.tools))) is not None:
+            candidate.use = (tool, "")
+        elif candidate.form is ROBTARGET and len(self.uses) == 1 and (use := next(iter(self.uses))) is not None:
+            candidate.use = use
         elif self.tools:
-            one.reason = "is used by no move, and it is not known which tool and work object it is meant for"
+            candidate.reason = "is used by no move, and it is not known which tool and work object it is meant for"
         else:
-            one.reason = "is used by no move of the program"
+            candidate.reason = "is used by no move of the program"
 
     def _moves(self) -> list[Move]:
         moves: list[Move] = []
         number, stretch, broken = -1, -1, True
-        for one in self.pending:
-            target, via = one.target, one.via
+        for move in self.pending:
+            target, via = move.target, move.via
             if target is None or target.index < 0:
                 broken = True
                 continue
-            if broken or (not one.exact and not one.motion.searches) or one.at.stretch != stretch:
+            if broken or (not move.exact and not move.motion.searches) or move.at.stretch != stretch:
                 number += 1
-            stretch, broken = one.at.stretch, not one.exact
+            stretch, broken = move.at.stretch, not move.exact
             known_via = via is not None and via.index >= 0
-            whole = one.whole or (one.motion.via is not None and not known_via) or not _plain(target)
+            whole = move.whole or (move.motion.via is not None and not known_via) or not _plain(target)
             moves.append(
                 Move(
-                    one.motion.kind, target.index, one.at.source, self.listing.line(one.at.source, one.at.start),
+                    move.motion.kind, target.index, move.at.source, self.listing.line(move.at.source, move.at.start),
                     via.index if via is not None and known_via else None, number,
-                    (0, 0) if whole else (one.at.start, one.at.stop + 1),
-                    (0, 0) if whole else one.target_text,
-                    None if whole else one.via_text,
+                    (0, 0) if whole else (move.at.start, move.at.stop + 1),
+                    (0, 0) if whole else move.target_text,
+                    None if whole else move.via_text,
                 )
             )  # fmt: skip
         return moves

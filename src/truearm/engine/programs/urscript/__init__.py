@@ -52,7 +52,7 @@ from truearm.engine.programs.urscript.targets import (
     Tcp,
     TcpFlow,
     Use,
-    made_program,
+    program_of,
 )
 from truearm.engine.programs.urscript.text import Call, Name, Numbers, Script, Value, split_moves
 from truearm.engine.robot.parts import Payload
@@ -90,7 +90,7 @@ _AT_REST: Final = re.compile(
 )
 
 
-def _is_one(text: str) -> bool:
+def _recognizes(text: str) -> bool:
     text = text.removeprefix(BYTE_ORDER_MARK)
     return not text.lstrip().startswith("<") and _LOOKS.search(text.replace("\r", "\n")) is not None
 
@@ -100,7 +100,7 @@ def _read(sources: Sequence[Source]) -> Program:
     unknown: Counter[str] = Counter()
     files = [_File(source, tools, frames, unknown) for source in sources]
     parts = [(file.script, file.targets, file.goings, file.skipped) for file in files]
-    program = made_program("URScript", tuple(sources), parts, tools, frames, unknown)
+    program = program_of("URScript", tuple(sources), parts, tools, frames, unknown)
     load = _load_of([file.script for file in files])
     return program if load is None else replace(program, loads={target.tool: load for target in program.targets})
 
@@ -112,14 +112,14 @@ def _commented(text: str, lines: Sequence[str]) -> str:
 
 def _load_of(scripts: Sequence[Script]) -> Payload | None:
     """Return what the robot carries, if all that the scripts say of it are the same numbers."""
-    said: set[Payload | None] = set()
+    loads: set[Payload | None] = set()
     for script in scripts:
         for call in _PAYLOAD.finditer(script.code):
             match = _LOAD.match(script.code, call.end())
             mass, *cog = [0.0] if match is None else [float(number) for number in match.groups()]
             plain = match is not None and mass >= 0.0 and all(abs(value) < _MOST_LOAD for value in (mass, *cog))
-            said.add(Payload(mass, (cog[0], cog[1], cog[2])) if plain else None)
-    return said.pop() if len(said) == 1 else None
+            loads.add(Payload(mass, (cog[0], cog[1], cog[2])) if plain else None)
+    return loads.pop() if len(loads) == 1 else None
 
 
 class _File:
@@ -140,7 +140,7 @@ class _File:
             if call.name in _MOVES:
                 kind, keyword = _MOVES[call.name]
                 to, via = self._ends(call, kind, keyword)
-                moves.append((call, kind, to, via, flow.here(call.routine), call.stretch + elsewhere))
+                moves.append((call, kind, to, via, flow.reached(call.routine), call.stretch + elsewhere))
             elif call.name == "set_tcp":
                 flow.set(call.routine, call.start, self._tcp(call))
             elif call.name in routines:
@@ -217,7 +217,7 @@ URSCRIPT: Final = Language(
     "URScript",
     (".script", ".urscript"),
     ("Universal Robots", "UR"),
-    _is_one,
+    _recognizes,
     _read,
     _commented,
     split_moves,

@@ -84,7 +84,7 @@ class TcpFlow:
         self._called: set[int] = set()
         self._ends: dict[tuple[int, Tcp], Tcp] = {}
 
-    def here(self, routine: int) -> Stretch:
+    def reached(self, routine: int) -> Stretch:
         """Return the stretch of a routine that was reached in the text."""
         return self._stretches[routine][-1]
 
@@ -139,10 +139,10 @@ class TcpFlow:
 #: Variables are followed through this many assignments.
 _DEEPEST_TARGETS: Final = 20
 #: Functions that tell where the robot is.
-_WHERE_IT_IS: Final = frozenset(
-    f"get_{which}_{what}"
-    for which in ("actual", "target")
-    for what in ("tcp_pose", "joint_positions", "tool_flange_pose", "tcp_pose_along_path")
+_CURRENT_PLACES: Final = frozenset(
+    f"get_{source}_{quantity}"
+    for source in ("actual", "target")
+    for quantity in ("tcp_pose", "joint_positions", "tool_flange_pose", "tcp_pose_along_path")
 ) | {"get_forward_kin", "tool_pose"}
 
 
@@ -170,7 +170,7 @@ class Use(NamedTuple):
     spot: Spot
     words: tuple[int, int]  #: In whose place other numbers could stand; ``(0, 0)`` if none could.
     near: tuple[float, ...] | None = None  #: The joints that it is named to be near to.
-    there: bool = True  #: Whether the move ends at the spot, and not at an offset beyond it that only the robot knows.
+    at_spot: bool = True  #: Whether the move ends there, and not at an offset beyond it that only the robot knows.
 
 
 class At(NamedTuple):
@@ -200,11 +200,11 @@ class Targets:
     def aim(self, value: Value, at: At) -> None:
         """Note the variables that a move goes to, and not only into the axes of."""
         if isinstance(value, Name):
-            found = self.names.find(value.name, at.routine, at.place)
-            if isinstance(found, Assignment) and not found.aimed:
-                found.aimed = True
-                if found.value is not None and at.depth < _DEEPEST_TARGETS:
-                    self.aim(found.value, At(found.routine, found.start, at.depth + 1))
+            assignment = self.names.find(value.name, at.routine, at.place)
+            if isinstance(assignment, Assignment) and not assignment.aimed:
+                assignment.aimed = True
+                if assignment.value is not None and at.depth < _DEEPEST_TARGETS:
+                    self.aim(assignment.value, At(assignment.routine, assignment.start, at.depth + 1))
         elif isinstance(value, Called) and value.function in ("get_inverse_kin", "pose_add"):
             first = self._argument(value, 0, "x" if value.function == "get_inverse_kin" else "p_1")
             if first is not None and at.depth < _DEEPEST_TARGETS:
@@ -227,22 +227,24 @@ class Targets:
                 return "joints stand in no frame"
             return Use(self._spot(value, name, frame, None, False), words)
         if isinstance(value, Name):
-            found = self._found(value.name, at)
-            if isinstance(found, str):
-                return found
-            if found.value is None:
+            assignment = self._assignment(value.name, at)
+            if isinstance(assignment, str):
+                return assignment
+            if assignment.value is None:
                 return f"the numbers of {value.name} are changed one by one"
-            numbers = found.numbers
+            numbers = assignment.numbers
             if numbers is not None:
-                found.series.reached = True
+                assignment.series.reached = True
                 use = self.reach(numbers, at, frame, value.name)
                 return use if isinstance(use, str) else Use(use.spot, words)
-            if self._comes_round(found.value, At(found.routine, found.start)):
+            if self._comes_round(assignment.value, At(assignment.routine, assignment.start)):
                 return f"{value.name} is computed from what changes later"
-            use = self.reach(found.value, At(found.routine, found.start, at.depth + 1), frame, value.name)
+            use = self.reach(
+                assignment.value, At(assignment.routine, assignment.start, at.depth + 1), frame, value.name
+            )
             if isinstance(use, str):
                 return use
-            return Use(use.spot, _in_frame(use, frame, words), use.near, use.there)
+            return Use(use.spot, _in_frame(use, frame, words), use.near, use.at_spot)
         deeper = At(at.routine, at.place, at.depth + 1)
         if value.function == "get_inverse_kin":
             return "joints stand in no frame" if frame else self._solved(value, deeper, name)
@@ -250,23 +252,23 @@ class Targets:
             return self._transformed(value, deeper, frame, name)
         if value.function == "pose_add":
             return self._added(value, deeper, frame, name)
-        if value.function in _WHERE_IT_IS:
+        if value.function in _CURRENT_PLACES:
             return "it depends on where the robot is"
         return f"it is computed by {value.function}"
 
     def plain(self, value: Value | None, at: At) -> tuple[Numbers, str] | None:
         """Return six numbers and their name, if a value is that or a variable that was assigned that."""
         if isinstance(value, Name):
-            found = self.names.find(value.name, at.routine, at.place)
-            if isinstance(found, Assignment) and found.numbers is not None:
-                return found.numbers, value.name
+            assignment = self.names.find(value.name, at.routine, at.place)
+            if isinstance(assignment, Assignment) and assignment.numbers is not None:
+                return assignment.numbers, value.name
         return (value, "") if isinstance(value, Numbers) else None
 
-    def _found(self, name: str, at: At) -> Assignment | str:
-        found = self.names.find(name, at.routine, at.place)
-        if found is None:
+    def _assignment(self, name: str, at: At) -> Assignment | str:
+        assignment = self.names.find(name, at.routine, at.place)
+        if assignment is None:
             return f"{name} is not declared in this program"
-        return f"{name} is an argument of its routine" if found == "argument" else found
+        return f"{name} is an argument of its routine" if assignment == "argument" else assignment
 
     def _argument(self, called: Called, index: int, keyword: str) -> Value | None:
         return self._script.argument(called.opened, index, keyword)
@@ -274,8 +276,8 @@ class Targets:
     def _comes_round(self, value: Value, at: At) -> bool:
         """Return whether a value has variables that are computed again behind it: a loop may sum it up."""
         if isinstance(value, Name):
-            found = self.names.find(value.name, at.routine, at.place)
-            return isinstance(found, Assignment) and found.series.last_computed >= at.place
+            assignment = self.names.find(value.name, at.routine, at.place)
+            return isinstance(assignment, Assignment) and assignment.series.last_computed >= at.place
         if isinstance(value, Called) and at.depth < _DEEPEST_TARGETS:
             deeper = At(at.routine, at.place, at.depth + 1)
             arguments = self._script.arguments(value.opened)
@@ -340,8 +342,8 @@ class Targets:
         if parent.numbers.kind == "joints" or use.near is not None:
             return "it is an offset from joints"
         plain = self.plain(offset, at)
-        if plain is None or not use.there:
-            return Use(parent, (0, 0), there=False)
+        if plain is None or not use.at_spot:
+            return Use(parent, (0, 0), at_spot=False)
         numbers, variable = plain
         if numbers.kind == "joints":
             return "it is an offset by joints"
@@ -354,19 +356,19 @@ class Targets:
             return self._named_frame(value, " ".join(self._script.code[value.start : value.stop].split()))
         if not isinstance(value, Name):
             return None
-        found = self._found(value.name, at)
-        if isinstance(found, str):
+        assignment = self._assignment(value.name, at)
+        if isinstance(assignment, str):
             undeclared = self.names.find(value.name, at.routine, at.place) is None
-            return _Frame(value.name) if undeclared else _Frame("", f"its frame {found}")
-        if found.aimed:
+            return _Frame(value.name) if undeclared else _Frame("", f"its frame {assignment}")
+        if assignment.aimed:
             return None
-        if found.numbers is None:
-            if isinstance(found.value, Name) and at.depth < _DEEPEST_TARGETS:
-                return self._frame(found.value, At(found.routine, found.start, at.depth + 1))
+        if assignment.numbers is None:
+            if isinstance(assignment.value, Name) and at.depth < _DEEPEST_TARGETS:
+                return self._frame(assignment.value, At(assignment.routine, assignment.start, at.depth + 1))
             return None
-        if found.series.several and found.routine != at.routine:
+        if assignment.series.several and assignment.routine != at.routine:
             return _Frame("", f"its frame {value.name} is assigned more than once, in another routine")
-        return self._named_frame(found.numbers, value.name)
+        return self._named_frame(assignment.numbers, value.name)
 
     def _named_frame(self, numbers: Numbers, name: str) -> _Frame:
         if numbers.kind == "joints":
@@ -384,7 +386,7 @@ class _Frame(NamedTuple):
 
 def _in_frame(use: Use, frame: str, words: tuple[int, int]) -> tuple[int, int]:
     """Return words for a spot if they stand in its frame, so that numbers in that frame can stand there."""
-    return words if use.there and use.spot.frame == frame else (0, 0)
+    return words if use.at_spot and use.spot.frame == frame else (0, 0)
 
 
 #: A pose, and joints; 1e-6 m are 0.001 mm, and 1e-6 rad less than 0.0001 deg.
@@ -410,7 +412,7 @@ class Going(NamedTuple):
 Part = tuple[Script, Targets, list[Going], list[tuple[int, str]]]
 
 
-def made_program(
+def program_of(
     language: str,
     sources: tuple[Source, ...],
     parts: Sequence[Part],
@@ -425,21 +427,21 @@ def made_program(
     moves: list[Move] = []
     skipped: list[Skipped] = []
     routines = 0
-    for source, (script, found, goings, left) in enumerate(parts):
+    for source, (script, script_targets, goings, left) in enumerate(parts):
         _note_tcps(goings)
-        _note_shared(found)
+        _note_shared(script_targets)
         skips = list(left)
-        kept: list[tuple[Spot, ProgramTarget]] = []
-        for spot in _with_unused(found, script, skips):
-            trouble = _trouble(spot, found)
+        pairs: list[tuple[Spot, ProgramTarget]] = []
+        for spot in _with_unused(script_targets, script, skips):
+            trouble = _trouble(spot, script_targets)
             if not spot.shared and trouble:
                 skips.append((spot.numbers.start, trouble))
             elif not spot.shared:
-                kept.append((spot, _target(spot, source, script, unset)))
-        kept.sort(key=lambda pair: pair[0].numbers.start)
-        for index, (spot, _) in enumerate(kept, len(targets)):
+                pairs.append((spot, _target(spot, source, script, unset)))
+        pairs.sort(key=lambda pair: pair[0].numbers.start)
+        for index, (spot, _) in enumerate(pairs, len(targets)):
             spot.index = index
-        for spot, target in kept:
+        for spot, target in pairs:
             targets.append(target if spot.parent is None else replace(target, parent=_final(spot.parent).index))
         moves += _moves(goings, source, script, routines)
         numbered = ((script.lines.number(place), reason) for place, reason in sorted(skips))
@@ -468,15 +470,15 @@ def _note_tcps(goings: list[Going]) -> None:
                 elif spot.tcps is not tcps:
                     spot.tcps = spot.tcps | tcps
                 spot = spot.parent
-            if use is not None and use.near is not None and use.there:
+            if use is not None and use.near is not None and use.at_spot:
                 use.spot.nears = (use.spot.nears or set()) | {use.near}
 
 
-def _note_shared(found: Targets) -> None:
+def _note_shared(targets: Targets) -> None:
     """Note the numbers that stand for more than one spot: offsets that several targets share, and confusions."""
     first: dict[int, Spot] = {}
     several: dict[int, list[Spot]] = {}
-    for spot in found.spots:
+    for spot in targets.spots:
         other = first.setdefault(spot.numbers.start, spot)
         if other is not spot:
             several.setdefault(spot.numbers.start, [other]).append(spot)
@@ -494,13 +496,13 @@ def _final(spot: Spot) -> Spot:
     return spot
 
 
-def _with_unused(found: Targets, script: Script, skips: list[tuple[int, str]]) -> list[Spot]:
+def _with_unused(targets: Targets, script: Script, skips: list[tuple[int, str]]) -> list[Spot]:
     """Return the spots, and those that variables of moves are assigned without a move that is known to go there."""
-    reached = {spot.numbers.start for spot in found.spots} | found.framed
-    tcps = {tcp for spot in found.spots for tcp in spot.tcps or ()}
-    frames = {spot.frame for spot in found.spots if spot.numbers.kind == "pose"}
-    spots = list(found.spots)
-    for series in found.names.series:
+    reached = {spot.numbers.start for spot in targets.spots} | targets.framed
+    tcps = {tcp for spot in targets.spots for tcp in spot.tcps or ()}
+    frames = {spot.frame for spot in targets.spots if spot.numbers.kind == "pose"}
+    spots = list(targets.spots)
+    for series in targets.names.series:
         for assignment in series.assignments if series.reached else ():
             numbers = assignment.numbers
             if numbers is None or numbers.start in reached or (numbers.kind == "pose" and not any(numbers.values)):
@@ -514,7 +516,7 @@ def _with_unused(found: Targets, script: Script, skips: list[tuple[int, str]]) -
     return spots
 
 
-def _trouble(spot: Spot, found: Targets) -> str:
+def _trouble(spot: Spot, targets: Targets) -> str:
     if spot.trouble:
         return spot.trouble
     tcps = spot.tcps or set()
@@ -525,9 +527,9 @@ def _trouble(spot: Spot, found: Targets) -> str:
         reason = f"moves reach it with several TCPs: {', '.join(names)}" if names else "it is not known with which TCP"
     elif spot.nears is not None and len(spot.nears) > 1:
         reason = "moves reach it near to different joints"
-    elif spot.numbers.start in found.framed:
+    elif spot.numbers.start in targets.framed:
         reason = "it is a frame of other targets"
-    elif spot.parent is not None and _trouble(_final(spot.parent), found):
+    elif spot.parent is not None and _trouble(_final(spot.parent), targets):
         reason = "it is an offset from a target that stays as it is"
     elif _open(spot) and _rotation(spot) == (0.0, 0.0, 0.0) and not _lends(spot):
         reason = "a circle passes it in an orientation that the program does not tell"
@@ -601,7 +603,7 @@ def _moves(goings: list[Going], source: int, script: Script, routines: int) -> l
                 via_text=passes,
             )
         )
-        lost += not end.there or end.spot.shared
+        lost += not end.at_spot or end.spot.shared
     return moves
 
 

@@ -109,7 +109,7 @@ class Text:
         self.source = source
         self.lines = Lines(source.text)
         code = without_mark(source.text).replace("\r", "\n")
-        self.code = _QUIET.sub(lambda found: " " * (found.end() - found.start()), code)
+        self.code = _QUIET.sub(lambda quiet: " " * (quiet.end() - quiet.start()), code)
         quote = self.code.find('"')
         if quote >= 0:
             raise self.refusal("a string is not closed", quote, "The file may be truncated.")
@@ -117,8 +117,8 @@ class Text:
         self.partner: dict[int, int] = {}
         self._arguments: dict[int, list[Argument]] = {}
         waiting: list[int] = []
-        for found in _BRACKET.finditer(self.code):
-            place = found.start()
+        for match in _BRACKET.finditer(self.code):
+            place = match.start()
             opening = _PAIRS.get(self.code[place])
             if opening is None:
                 waiting.append(place)
@@ -136,22 +136,22 @@ class Text:
 
     def arguments(self, opened: int) -> list[Argument]:
         """Return the arguments between a bracket and its partner."""
-        found = self._arguments.get(opened)
-        if found is None:
-            found = self._arguments[opened] = []
+        arguments = self._arguments.get(opened)
+        if arguments is None:
+            arguments = self._arguments[opened] = []
             closed, place = self.partner[opened], opened
             while place < closed:
                 argument, place = self._item(place + 1)
-                if found or place < closed or argument.value.start < argument.value.stop:
-                    found.append(argument)
-        return found
+                if arguments or place < closed or argument.value.start < argument.value.stop:
+                    arguments.append(argument)
+        return arguments
 
     def argument(self, opened: int, index: int, keyword: str) -> Value | None:
         """Return an argument by its keyword, or its place among those without one; None if it is not there."""
         arguments = self.arguments(opened)
-        for one in arguments:
-            if one.keyword == keyword:
-                return one.value
+        for argument in arguments:
+            if argument.keyword == keyword:
+                return argument.value
         if index < len(arguments) and not arguments[index].keyword:
             value = arguments[index].value
             return value if value.start < value.stop else None
@@ -231,18 +231,18 @@ class Text:
 
     def _next(self, pattern: re.Pattern[str], place: int) -> int:
         """Return where a pattern is found next outside of the brackets that open on the way."""
-        while (found := pattern.search(self.code, place)) is not None:
-            closed = self.partner.get(found.start())
+        while (match := pattern.search(self.code, place)) is not None:
+            closed = self.partner.get(match.start())
             if closed is None:
-                return found.start()
+                return match.start()
             place = closed + 1
         return len(self.code)
 
 
-def _numbers(found: re.Match[str], group: int) -> Numbers:
+def _numbers(match: re.Match[str], group: int) -> Numbers:
     """Return the six numbers of a match, of which the group is the whole, the next ones its ``p`` and the numbers."""
-    spans: tuple[tuple[int, int], ...] = found.regs  # of all groups at once
-    kind, *words = found.groups()[group : group + 7]
+    spans: tuple[tuple[int, int], ...] = match.regs  # of all groups at once
+    kind, *words = match.groups()[group : group + 7]
     return Numbers("pose" if kind else "joints", tuple(map(float, words)), spans[group + 2 : group + 8], *spans[group])
 
 
@@ -344,49 +344,49 @@ class Script(Text):
         blocks: list[tuple[int, int]] = []
         code, partner = self.code, self.partner
         routine = inside = place = stretch = 0
-        while (found := _EVENT.search(code, place)) is not None:
-            place = found.end()
-            event = found.lastgroup
+        while (match := _EVENT.search(code, place)) is not None:
+            place = match.end()
+            event = match.lastgroup
             if event == "call":
-                call = found["call"]
+                call = match["call"]
                 if call in ("if", "while"):
-                    blocks.append((found.start("call"), routine))
+                    blocks.append((match.start("call"), routine))
                 stretch += call in ("if", "while", "elif")
                 inside = max(inside, partner[place - 1])
                 if call not in _NO_CALLS:
-                    first = found["first"] is not None
-                    self.calls.append(Call(call, found.start("call"), place - 1, routine, first, stretch))
+                    first = match["first"] is not None
+                    self.calls.append(Call(call, match.start("call"), place - 1, routine, first, stretch))
                     if call in whole:
                         place = partner[place - 1]
             elif event == "variable":
-                if found.start() >= inside:
+                if match.start() >= inside:
                     value = self.assigned(place)
-                    start, scope = found.start("variable"), found["scope"] or ""
-                    self.assignments.append(Assignment(found["variable"], start, value, routine, scope))
+                    start, scope = match.start("variable"), match["scope"] or ""
+                    self.assignments.append(Assignment(match["variable"], start, value, routine, scope))
                     place = value.stop if isinstance(value, Numbers) else place
             elif event == "element":
                 assigned = _ASSIGNED.match(code, partner[place - 1] + 1)
-                if assigned is not None and found.start() >= inside:
-                    place, start = assigned.end(), found.start("variable")
-                    self.assignments.append(Assignment(found["variable"], start, None, routine, ""))
+                if assigned is not None and match.start() >= inside:
+                    place, start = assigned.end(), match.start("variable")
+                    self.assignments.append(Assignment(match["variable"], start, None, routine, ""))
             elif event == "header":
-                blocks.append((found.start(), routine))
+                blocks.append((match.start(), routine))
                 arguments = self.arguments(place - 1)
                 names = (argument.keyword or code[argument.value.start : argument.value.stop] for argument in arguments)
-                self.routines.append(Routine(found["header"], found.start(), routine, frozenset(names)))
+                self.routines.append(Routine(match["header"], match.start(), routine, frozenset(names)))
                 routine = len(self.routines) - 1
                 stretch += 1
                 place = partner[place - 1]
             else:
                 stretch += 1
                 if event == "block":
-                    blocks.append((found.start(), routine))
+                    blocks.append((match.start(), routine))
                 elif event == "end" and blocks:
                     routine = blocks.pop()[1]
         if blocks:
             word = _WORD_SCRIPT.search(code, blocks[-1][0])
-            what = "routine or block" if word is None else word[0]
-            raise self.refusal(f"this {what} has no end", blocks[-1][0], "The file may be truncated.")
+            kind = "routine or block" if word is None else word[0]
+            raise self.refusal(f"this {kind} has no end", blocks[-1][0], "The file may be truncated.")
 
 
 # What a variable of a URScript file holds where it is used.
@@ -462,9 +462,9 @@ def split_moves(program: Program, splits: Sequence[Split]) -> SplitEdits:
         source = program.moves[split.move].source
         if source not in texts:
             texts[source] = _Blends(Text(program.sources[source]))
-        made = _edits(program, split, texts[source])
-        edits += made
-        whole += [] if made else [split.move]
+        new_edits = _edits(program, split, texts[source])
+        edits += new_edits
+        whole += [] if new_edits else [split.move]
     return SplitEdits(edits, whole)
 
 
@@ -486,16 +486,16 @@ class _Blends:
             return 0.0
         word = self.text.code[argument.start : argument.stop]
         if word not in self._known:
-            self._known[word] = self._found(word)
+            self._known[word] = self._value(word)
         return self._known[word]
 
-    def _found(self, word: str) -> float | None:
+    def _value(self, word: str) -> float | None:
         if re.fullmatch(NUMBER, word, re.ASCII):
             return float(word)
         if not _WORD_SPLIT.fullmatch(word):
             return None
         assigned = re.findall(rf"(?<![\w.]){word}[ \t]*=(?!=)[ \t]*([^\n]*)", self.text.code)
-        values = [float(one) for one in map(str.rstrip, assigned) if re.fullmatch(NUMBER, one, re.ASCII)]
+        values = [float(text) for text in map(str.rstrip, assigned) if re.fullmatch(NUMBER, text, re.ASCII)]
         return max(values) if values and len(values) == len(assigned) else None
 
     def radius(self, move: Move) -> float | None:
@@ -552,8 +552,8 @@ def _radius(program: Program, split: Split, blends: _Blends) -> str | None:
             points.append(target.values[:3])
         shortest = min((math.dist(a, b) for a, b in pairwise(points)), default=math.inf)
     radius = min(_RADIUS, shortest / 4)
-    room = shortest - radius if math.isfinite(shortest) else _RADIUS
-    if max(own, coming) > room:
+    longest = shortest - radius if math.isfinite(shortest) else _RADIUS
+    if max(own, coming) > longest:
         return None
     return written(radius, _DECIMALS)
 

@@ -67,7 +67,7 @@ Key = tuple[str, str]
 Tools = set[str | None]
 
 
-def is_one(text: str) -> bool:
+def recognizes(text: str) -> bool:
     """Tell whether a text is a file of a VAL3 application."""
     return _ROOT.match(text) is not None
 
@@ -96,22 +96,22 @@ def read(sources: Sequence[Source]) -> Program:
     for index, source in enumerate(sources):
         application = applications.setdefault(source.path.parent, _Application())
         _take(application, index, source, lines[index])
-    found = _Found()
+    contents = _Contents()
     for application in applications.values():
         _note_tools(application)
-        places = _add_data(found, application)
-        _add_moves(found, application, places)
-    targets, moves = _in_order(found)
+        places = _add_data(contents, application)
+        _add_moves(contents, application, places)
+    targets, moves = _in_order(contents)
     every = applications.values()
     return Program(
         language=VAL3.name,
         sources=tuple(sources),
         targets=targets,
         moves=moves,
-        tools=transforms("tool", sources, [(one.variables, one.changed, one.length) for one in every]),
-        frames=transforms("frame", sources, [(one.variables, one.changed, one.length) for one in every]),
-        skipped=tuple(sorted(found.skipped, key=lambda skipped: (skipped.source, skipped.line))),
-        unknown=dict(sum((routine.unknown for one in every for _, routine in one.routines), Counter())),
+        tools=transforms("tool", sources, [(app.variables, app.changed, app.length) for app in every]),
+        frames=transforms("frame", sources, [(app.variables, app.changed, app.length) for app in every]),
+        skipped=tuple(sorted(contents.skipped, key=lambda skipped: (skipped.source, skipped.line))),
+        unknown=dict(sum((routine.unknown for app in every for _, routine in app.routines), Counter())),
     )
 
 
@@ -130,7 +130,7 @@ class _Application:
 
 
 @dataclass
-class _Found:
+class _Contents:
     targets: list[ProgramTarget] = field(default_factory=list)
     moves: list[Move] = field(default_factory=list)
     skipped: list[Skipped] = field(default_factory=list)
@@ -177,7 +177,7 @@ def _note_tools(application: _Application) -> None:
                     application.tools_of_elements.setdefault((name, key), set()).add(tool)
 
 
-def _add_data(found: _Found, application: _Application) -> dict[Key, int]:
+def _add_data(contents: _Contents, application: _Application) -> dict[Key, int]:
     """Make targets of the elements of points and joint positions, and return the places of the targets."""
     places: dict[Key, int] = {}
     declared: Tools = {
@@ -202,10 +202,10 @@ def _add_data(found: _Found, application: _Application) -> dict[Key, int]:
             written = name_of(name, key)
             reason = _reason(application, variable, element, tools)
             if reason is not None:
-                found.skipped.append(Skipped(variable.source, element.line, f"{written} {reason}"))
+                contents.skipped.append(Skipped(variable.source, element.line, f"{written} {reason}"))
                 continue
-            places[name, key] = len(found.targets)
-            found.targets.append(
+            places[name, key] = len(contents.targets)
+            contents.targets.append(
                 ProgramTarget(
                     variable.source,
                     element.line,
@@ -240,38 +240,38 @@ def _reason(application: _Application, variable: Variable, element: Element, too
     return None
 
 
-def _add_moves(found: _Found, application: _Application, places: dict[Key, int]) -> None:
+def _add_moves(contents: _Contents, application: _Application, places: dict[Key, int]) -> None:
     """Make moves of the programs, and targets of the offsets in them."""
     for index, routine in application.routines:
         for move in routine.moves:
             ends: list[int | None] = []
             for words in (move.via, move.target) if move is not None else ():
-                made = _target(found, application, places, index, routine, words) if words is not None else None
-                if isinstance(made, str) and words is not None:
-                    found.skipped.append(Skipped(index, words.line, made))
-                ends.append(made if isinstance(made, int) else None)
+                target = _target(contents, application, places, index, routine, words) if words is not None else None
+                if isinstance(target, str) and words is not None:
+                    contents.skipped.append(Skipped(index, words.line, target))
+                ends.append(target if isinstance(target, int) else None)
             via, end = ends or (None, None)
             if move is None or end is None or (move.via is not None and via is None):
-                found.routines += 1
+                contents.routines += 1
                 continue
-            found.moves.append(
+            contents.moves.append(
                 Move(
                     move.kind,
                     end,
                     index,
                     move.line,
                     via,
-                    found.routines,
+                    contents.routines,
                     (move.start, move.stop),
                     (move.target.start, move.target.stop),
                     (move.via.start, move.via.stop) if move.via is not None else None,
                 )
             )
-        found.routines += 1
+        contents.routines += 1
 
 
 def _target(
-    found: _Found, application: _Application, places: dict[Key, int], index: int, routine: Routine, words: Words
+    contents: _Contents, application: _Application, places: dict[Key, int], index: int, routine: Routine, words: Words
 ) -> int | str | None:
     """Return the target that words of a move mean, or why it is not known, or None if the reason is given elsewhere."""
     if words.point is None or words.point[0] in routine.own:
@@ -289,10 +289,10 @@ def _target(
         return place
     if place is None:
         return f"the offset is from {name_of(name, key)}, which is left as it is"
-    parent = found.targets[place]
+    parent = contents.targets[place]
     if parent.form.kind != "pose":
         return place
-    found.targets.append(
+    contents.targets.append(
         replace(
             parent,
             source=index,
@@ -304,20 +304,22 @@ def _target(
             turned=True,
         )
     )
-    return len(found.targets) - 1
+    return len(contents.targets) - 1
 
 
-def _in_order(found: _Found) -> tuple[tuple[ProgramTarget, ...], tuple[Move, ...]]:
+def _in_order(contents: _Contents) -> tuple[tuple[ProgramTarget, ...], tuple[Move, ...]]:
     """Return targets and moves with the targets in the order of the text."""
-    order = sorted(range(len(found.targets)), key=lambda i: (found.targets[i].source, found.targets[i].places[0]))
+    order = sorted(
+        range(len(contents.targets)), key=lambda i: (contents.targets[i].source, contents.targets[i].places[0])
+    )
     if order == list(range(len(order))):
-        return tuple(found.targets), tuple(found.moves)
+        return tuple(contents.targets), tuple(contents.moves)
     new = {old: i for i, old in enumerate(order)}
-    ordered = (found.targets[old] for old in order)
+    ordered = (contents.targets[old] for old in order)
     targets = (replace(t, parent=new[t.parent]) if t.parent is not None else t for t in ordered)
     moves = (
         replace(move, target=new[move.target], via=new[move.via] if move.via is not None else None)
-        for move in found.moves
+        for move in contents.moves
     )
     return tuple(targets), tuple(moves)
 
@@ -334,10 +336,10 @@ def _form(type_: str, length: float) -> Form:
 
 @cache
 def _configuration(words: tuple[str, ...]) -> Configuration:
-    said = [_POSTURES.get(word, ANY_POSTURE) for word in words]
+    postures = [_POSTURES.get(word, ANY_POSTURE) for word in words]
     return Configuration(
-        shoulder=next((part.shoulder for part in said if part.shoulder is not None), None),
-        ranges=tuple(reading for part in said for reading in part.ranges),
+        shoulder=next((part.shoulder for part in postures if part.shoulder is not None), None),
+        ranges=tuple(reading for part in postures for reading in part.ranges),
     )
 
 
@@ -350,7 +352,7 @@ VAL3: Final = Language(
     "VAL3",
     (".dtx", ".pgx", ".pjx"),
     ("Stäubli",),
-    is_one,
+    recognizes,
     read,
     commented,
     new=new_program,

@@ -144,17 +144,17 @@ def _bare(raw: str) -> str:
     """Return code without markup, comments and strings, every character at its place."""
 
     def plain(piece: str) -> str:
-        def character(found: re.Match[str]) -> str:
-            return _CHARACTERS.get(found[1], " ").ljust(len(found[0]))
+        def character(entity: re.Match[str]) -> str:
+            return _CHARACTERS.get(entity[1], " ").ljust(len(entity[0]))
 
-        return _ENTITY.sub(character, _MARKUP.sub(lambda found: _blank(found[0]), piece))
+        return _ENTITY.sub(character, _MARKUP.sub(lambda tag: _blank(tag[0]), piece))
 
     parts, end = [], 0
-    for found in _CDATA.finditer(raw):
-        parts += [plain(raw[end : found.start()]), " " * 9, found[1], " " * 3]
-        end = found.end()
+    for match in _CDATA.finditer(raw):
+        parts += [plain(raw[end : match.start()]), " " * 9, match[1], " " * 3]
+        end = match.end()
     parts.append(plain(raw[end:]))
-    return _SILENT.sub(lambda found: _blank(found[0]), "".join(parts))
+    return _SILENT.sub(lambda silent: _blank(silent[0]), "".join(parts))
 
 
 def _read(source: Source, lines: Lines, routine: Routine, start: int, stop: int) -> None:
@@ -164,40 +164,40 @@ def _read(source: Source, lines: Lines, routine: Routine, start: int, stop: int)
         return
     if _BEGIN.match(code) is None or _END.search(code.rstrip()) is None:
         source.refuse(lines.number(stop), "the code is not complete: it runs from begin to end")
-    routine.changed.update(found[1] for found in _ASSIGNED.finditer(code))
-    for found in _CALL.finditer(code):
-        name = found[2]
+    routine.changed.update(assigned[1] for assigned in _ASSIGNED.finditer(code))
+    for match in _CALL.finditer(code):
+        name = match[2]
         if name in _KINDS:
-            routine.moves.append(_move(source, lines, code, found, start))
+            routine.moves.append(_move(source, lines, code, match, start))
             continue
         known = name.rpartition(":")[2].lower() in _KNOWN
-        if found[1] is None and known and name not in _CHANGERS:
+        if match[1] is None and known and name not in _CHANGERS:
             continue
-        arguments, last = _arguments(source, lines, code, found.end(), start)
+        arguments, last = _arguments(source, lines, code, match.end(), start)
         if name in _CHANGERS:
             routine.changed.update(_WORD.findall(code, *arguments[_CHANGERS[name]]))
             continue
-        routine.handed_over.update(_WORD.findall(code, found.end(), last))
+        routine.handed_over.update(_WORD.findall(code, match.end(), last))
         routine.moves.append(None)
-        if found[1] is None:
+        if match[1] is None:
             routine.unknown[name] += 1
 
 
 def _arguments(source: Source, lines: Lines, code: str, place: int, start: int) -> tuple[list[tuple[int, int]], int]:
     """Return where the arguments of a call stand, and where its last bracket does."""
-    depth, begin, found = 0, place, []
+    depth, begin, spans = 0, place, []
     for bracket in _BRACKET.finditer(code, place):
         if bracket[0] in "({[":
             depth += 1
         elif bracket[0] == ",":
             if depth == 0:
-                found.append((begin, bracket.start()))
+                spans.append((begin, bracket.start()))
                 begin = bracket.end()
         elif depth:
             depth -= 1
         else:
-            found.append((begin, bracket.start()))
-            return found, bracket.start()
+            spans.append((begin, bracket.start()))
+            return spans, bracket.start()
     return source.refuse(lines.number(start + place), "a bracket is not closed")
 
 

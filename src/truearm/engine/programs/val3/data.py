@@ -164,9 +164,9 @@ class _Reader:
         written: dict[str, tuple[str, int]] = {}
         named = _NAME.match(text, place)
         after = named.end() if named is not None else place
-        for found in _ATTRIBUTE.finditer(text, place, stop):
-            quoted = 2 if found[2] is not None else 3
-            written[found[1]] = found[quoted], found.start(quoted)
+        for match in _ATTRIBUTE.finditer(text, place, stop):
+            quoted = 2 if match[2] is not None else 3
+            written[match[1]] = match[quoted], match.start(quoted)
         if "key" in written:
             after = written["key"][1] + len(written["key"][0]) + 1
         values: list[float] = []
@@ -177,14 +177,14 @@ class _Reader:
                 places.append((after, after))
                 continue
             number, start = written[name]
-            found_number = _NUMBER.fullmatch(number)
-            if found_number is None:
+            number_match = _NUMBER.fullmatch(number)
+            if number_match is None:
                 self._source.refuse(line, f"{name} of {variable.name} is no number", came=number)
-            value = float(found_number[1])
+            value = float(number_match[1])
             if abs(value) > LARGEST:
                 self._source.refuse(line, f"{name} of {variable.name} is out of all proportion", came=number)
             values.append(value)
-            places.append((start + found_number.start(1), start + found_number.end(1)))
+            places.append((start + number_match.start(1), start + number_match.end(1)))
             after = start + len(number) + 1
         return tuple(values), tuple(places)
 
@@ -227,7 +227,7 @@ def transforms(
     type_: Literal["frame", "tool"], sources: Sequence[Source], applications: Sequence[Application]
 ) -> dict[str, Transform]:
     """Return the frames or tools by name, without those that a program changes or that rest on unknown ones."""
-    found: dict[str, Transform] = {}
+    by_name: dict[str, Transform] = {}
     for application in applications:
         for bare, variable in application[0].items():
             if variable.type != type_ or bare == _GROUND[type_]:
@@ -235,13 +235,13 @@ def transforms(
             for key, element in variable.elements.items():
                 name = name_of(bare, key)
                 transform = _chained(type_, sources, application, name)
-                if transform is not None and found.setdefault(name, transform) != transform:
+                if transform is not None and by_name.setdefault(name, transform) != transform:
                     raise InputError(
                         f"{name} is not the same in two applications",
                         where=sources[variable.source].where(element.line),
                         cure="Correct the applications one by one.",
                     )
-    return found
+    return by_name
 
 
 def _chained(

@@ -56,15 +56,15 @@ def new_program(program: NewProgram) -> dict[str, str]:
     if straight:
         points = [element(k - 1, zip(NAMES, program.pose(k, POINT), strict=True), "", SAME) for k in range(1, count)]
         data.append(variable("pPath", "pointRx", points))
-    said = ""
+    current_speed = ""
     for row in range(1, count):
         if not straight:
             steps.append(f"  movej(jPath[{row}],flange,mPath)")
             continue
         speed = f"{program.speed(row) * 1e3:.3f}"
-        if speed != said:
+        if speed != current_speed:
             steps.append(f"  mPath.tvel={speed}")
-            said = speed
+            current_speed = speed
         steps.append(f"  movel(pPath[{row - 1}],flange,mPath)")
     return application(name, data, steps)
 
@@ -112,7 +112,7 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
     Joint motions have the descriptor mJoint, straight moves and arcs that stop mStop, and others mBlend.
     """
     places = program.places()
-    rows = {kind: [row for one, row in places if one == kind] for kind in ("joints", "pose")}
+    rows = {kind: [row for place_kind, row in places if place_kind == kind] for kind in ("joints", "pose")}
     keys = {(kind, row): key for kind, known in rows.items() for key, row in enumerate(known)}
     axes = [zip("123456", program.axes(row, JOINT), strict=False) for row in rows["joints"]]
     poses = [zip(NAMES, program.pose(row, POINT), strict=True) for row in rows["pose"]]
@@ -131,11 +131,11 @@ def motion_program(program: MotionProgram) -> dict[str, str]:
         data.append(variable("nKey", "num", ['<Value key="0" value="0" />']))
     lines = [f"  // {line}" for line in program.comments]
     lines += [] if program.carried is None else ["  // The controller must hold this load"]
-    said: dict[str, str] = {}
+    current: dict[str, str] = {}
 
     def say(name: str, value: str) -> None:
-        if said.get(name) != value:
-            said[name] = value
+        if current.get(name) != value:
+            current[name] = value
             lines.append(f"  {name}={value}")
 
     for step, near in program.zoned():

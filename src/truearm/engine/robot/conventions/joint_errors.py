@@ -21,5 +21,5 @@ class JointErrorsConvention(Convention):
 
     def elements(self, number: int, row: Mapping[str, float], kind: JointKind) -> tuple[Element, ...]:
         """Build the design, which stays, the errors and the joint."""
-        made = super().elements(number, row, kind)
-        return tuple(replace(e, parameter=None) for e in made[:6]) + made[6:]
+        elements = super().elements(number, row, kind)
+        return tuple(replace(e, parameter=None) for e in elements[:6]) + elements[6:]

@@ -94,7 +94,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
     controller = robot.controller
     if controller.kinematics.rows:  # a converted robot has lost the nominal values that they stand beside
         controller = replace(controller, kinematics=ControllerKinematics())
-    made = replace(
+    result = replace(
         robot,
         convention_name=convention_name,
         controller=controller,
@@ -112,27 +112,27 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in links.base[:3, :3].T @ base[:3, :3] @ robot.gravity)
         its = np.linalg.inv(links.base) @ base @ robot.controller.base.matrix
         controller = replace(controller, base=_transform(its))
-        made = replace(_based(made, links.base), gravity=(x, y, z), controller=controller)
-    behind = np.linalg.inv(at_zero(made, made.rigid.trunk.elements)) @ flange
+        result = replace(_based(result, links.base), gravity=(x, y, z), controller=controller)
+    behind = np.linalg.inv(at_zero(result, result.rigid.trunk.elements)) @ flange
     if np.abs(behind - np.eye(4)).max() > _SAME_FRAME:
-        made = replace(made, flange=_transform(behind))
-    upright = float(made.base.rotation[:, 2] @ base[:3, 2]) > _UPRIGHT
+        result = replace(result, flange=_transform(behind))
+    upright = float(result.base.rotation[:, 2] @ base[:3, 2]) > _UPRIGHT
     lost = [
         *([f"truths {', '.join(robot.truths)}"] if robot.truths else []),
         *(["link masses, because the base's z has turned"] if robot.masses and not upright else []),
     ]
-    said = [
+    remarks = [
         f"converted from {robot.convention_name} to {convention_name}",
         *(["the base frame now lies on the first axis"] if moved else []),
         *([f"left out: {' and '.join(lost)}"] if lost else []),
     ]
-    made = in_its_axes(robot, made)
+    result = in_its_axes(robot, result)
     return replace(
-        made,
-        joints=_with_bearings(robot, made),
-        masses=_moved_masses(robot, made) if upright else (),
-        balancers=tuple(_moved_balancer(balancer, robot, made) for balancer in robot.balancers),
-        history=(*robot.history, "; ".join(said)),
+        result,
+        joints=_with_bearings(robot, result),
+        masses=_moved_masses(robot, result) if upright else (),
+        balancers=tuple(_moved_balancer(balancer, robot, result) for balancer in robot.balancers),
+        history=(*robot.history, "; ".join(remarks)),
     )
 
 
@@ -166,14 +166,14 @@ def _with_bearings(before: Robot, after: Robot) -> tuple[Joint, ...]:
     """
     tilts = any(effect.tilts for effect in before.effects)
     rows = zip(after.joints, before.bearings, joint_axes(before), joint_axes(after), strict=True)
-    made = []
+    joints = []
     for joint, bearing, old, new in rows:
         if joint.kind == "revolute" and (tilts or joint.bearing is not None):
             along = float((old.point - new.point) @ new.along)
-            made.append(replace(joint, bearing=round(bearing + along, _DECIMALS) + 0.0))
+            joints.append(replace(joint, bearing=round(bearing + along, _DECIMALS) + 0.0))
         else:
-            made.append(joint)
-    return tuple(made)
+            joints.append(joint)
+    return tuple(joints)
 
 
 def _moved_masses(before: Robot, after: Robot) -> tuple[LinkMass, ...]:
@@ -189,8 +189,8 @@ def _moved_masses(before: Robot, after: Robot) -> tuple[LinkMass, ...]:
 def _moved_balancer(balancer: Balancer, before: Robot, after: Robot) -> Balancer:
     def moved(anchor: Anchor) -> Anchor:
         point = before.axial_slides.stayed(anchor.link, anchor.point, before.values)
-        there = _link_frames(before, after, anchor.link) @ [*point, 1.0]
-        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in there)
+        moved_point = _link_frames(before, after, anchor.link) @ [*point, 1.0]
+        x, y, z, _ = (round(float(v), _DECIMALS) + 0.0 for v in moved_point)
         return replace(anchor, point=(x, y, z))
 
     return replace(balancer, fixed=moved(balancer.fixed), moving=moved(balancer.moving))

@@ -103,24 +103,24 @@ def hayati(robot: Robot, *, modified: bool) -> Links:
     axes = joint_axes(robot)
     base, flange = base_and_flange(robot)
     start = first_frame(base, axes[0])
-    x, here = start[:3, 0], start[:3, 3]
+    x, origin = start[:3, 0], start[:3, 3]
     before: list[Row] = []  # theta and d of each joint
     behind: list[Row] = []  # a, alpha and beta to the next one
     for axis, following in pairwise(axes):
         if axis.angle(following) < _BETA:
             find = _tilted_in_modified_form if modified else _tilted_in_standard_form
-            normal, link, next_x, landing = find(axis, following, x, here)
-            foot = here
+            normal, link, next_x, landing = find(axis, following, x, origin)
+            foot = origin
         else:
-            normal, foot, landing = common_normal(axis, following, x, here)
+            normal, foot, landing = common_normal(axis, following, x, origin)
             link = {"a": float((landing - foot) @ normal), "alpha": turn(axis.along, following.along, normal)}
             next_x = normal
-        before.append({JOINT: turn(x, normal, axis.along), "d": float((foot - here) @ axis.along)})
+        before.append({JOINT: turn(x, normal, axis.along), "d": float((foot - origin) @ axis.along)})
         behind.append(link)
-        x, here = next_x, landing
+        x, origin = next_x, landing
     last = axes[-1]
     normal, foot = across(flange[:3, :3], last.along), last.nearest(flange[:3, 3])
-    before.append({JOINT: turn(x, normal, last.along), "d": float((foot - here) @ last.along)})
+    before.append({JOINT: turn(x, normal, last.along), "d": float((foot - origin) @ last.along)})
     nothing: Row = {"a": 0.0, "alpha": 0.0}
     behind = [nothing, *behind] if modified else [*behind, nothing]
     rows: list[Mapping[str, float]] = [
@@ -130,30 +130,30 @@ def hayati(robot: Robot, *, modified: bool) -> Links:
 
 
 def _tilted_in_standard_form(
-    axis: JointAxis, following: JointAxis, x: Array, here: Array
+    axis: JointAxis, following: JointAxis, x: Array, origin: Array
 ) -> tuple[Array, Row, Array, Array]:
     """Return the x before the tilt, the row, the x behind it and the next origin of ``Tx(a) Rx(alpha) Ry(beta)``."""
-    way = float((here - following.point) @ axis.along) / float(following.along @ axis.along)
+    way = float((origin - following.point) @ axis.along) / float(following.along @ axis.along)
     landing = following.point + way * following.along
-    normal = _side(landing - here, x)
+    normal = _side(landing - origin, x)
     y = np.cross(axis.along, normal)
     alpha, beta = _tilt(following.along, normal, y, axis.along)
     next_x = math.cos(beta) * normal + math.sin(beta) * (math.sin(alpha) * y - math.cos(alpha) * axis.along)
-    return normal, {"a": float((landing - here) @ normal), "alpha": alpha, "beta": beta}, next_x, landing
+    return normal, {"a": float((landing - origin) @ normal), "alpha": alpha, "beta": beta}, next_x, landing
 
 
 def _tilted_in_modified_form(
-    axis: JointAxis, following: JointAxis, x: Array, here: Array
+    axis: JointAxis, following: JointAxis, x: Array, origin: Array
 ) -> tuple[Array, Row, Array, Array]:
     """Return the same for ``Rx(alpha) Ry(beta) Tx(a)``."""
-    landing = following.nearest(here)
+    landing = following.nearest(origin)
     square = x - (x @ following.along) * following.along
-    next_x = _side(landing - here, square / np.linalg.norm(square))
+    next_x = _side(landing - origin, square / np.linalg.norm(square))
     normal = np.cross(np.cross(following.along, next_x), axis.along)
     normal = normal * math.copysign(1.0, float(normal @ next_x)) / np.linalg.norm(normal)
     y = np.cross(axis.along, normal)
     alpha, beta = _tilt(following.along, normal, y, axis.along)
-    return normal, {"alpha": alpha, "beta": beta, "a": float((landing - here) @ next_x)}, next_x, landing
+    return normal, {"alpha": alpha, "beta": beta, "a": float((landing - origin) @ next_x)}, next_x, landing
 
 
 def _side(gap: Array, before: Array) -> Array:
@@ -195,15 +195,15 @@ def mcpc(robot: Robot) -> Links:
 def translations(robot: Robot) -> Links:
     """Return combinations of translations: to a point of the next axis, then along it."""
     axes = joint_axes(robot)
-    here = base_and_flange(robot)[0]
+    frame = base_and_flange(robot)[0]
     rows = []
     for number, axis in enumerate(axes):
-        slides = here[:3, :3].T @ (axis.point - here[:3, 3])
-        angles, R = _angles("rx", "ry")(here[:3, :3].T @ axis.along)
-        here = _moved(here, slides, R)
-        aside = _aside(here, axes[number + 1].along) if number + 1 < len(axes) else 0.0
+        slides = frame[:3, :3].T @ (axis.point - frame[:3, 3])
+        angles, R = _angles("rx", "ry")(frame[:3, :3].T @ axis.along)
+        frame = _moved(frame, slides, R)
+        aside = _aside(frame, axes[number + 1].along) if number + 1 < len(axes) else 0.0
         rows.append({**dict(zip("xyz", map(float, slides), strict=True)), **angles, JOINT: aside})
-        here = _moved(here, np.zeros(3), _about_z(aside))
+        frame = _moved(frame, np.zeros(3), _about_z(aside))
     return Links(tuple(rows))
 
 
@@ -223,23 +223,23 @@ def _links(robot: Robot, tilt: Tilt, last: tuple[str, str, str, str]) -> Links:
     """Return links ``Rz(theta) tilt Rz Tx Ty Tz``, with the columns `last`; inner ones have no Rz and no Tz."""
     axes = joint_axes(robot)
     base, flange = base_and_flange(robot)
-    here = start = first_frame(base, axes[0])
+    frame = start = first_frame(base, axes[0])
     turn, *slides = last
     rows = []
     ends = [*axes[1:], JointAxis(robot.joints[-1], flange[:3, 2], flange[:3, 3])]
     for end in ends:
-        aside = 0.0 if tilt is _direction else _aside(here, end.along)
-        here = _moved(here, np.zeros(3), _about_z(aside))
-        entries, R = tilt(here[:3, :3].T @ end.along)
-        here = _moved(here, np.zeros(3), R)
+        aside = 0.0 if tilt is _direction else _aside(frame, end.along)
+        frame = _moved(frame, np.zeros(3), _about_z(aside))
+        entries, R = tilt(frame[:3, :3].T @ end.along)
+        frame = _moved(frame, np.zeros(3), R)
         row = {JOINT: aside, **entries}
         if end is ends[-1]:
-            rest = here[:3, :3].T @ flange[:3, :3]
-            row[turn] = math.atan2(rest[1, 0], rest[0, 0])
-            here = _moved(here, np.zeros(3), _about_z(row[turn]))
-        way = here[:3, :3].T @ (end.point - here[:3, 3])
+            rotation = frame[:3, :3].T @ flange[:3, :3]
+            row[turn] = math.atan2(rotation[1, 0], rotation[0, 0])
+            frame = _moved(frame, np.zeros(3), _about_z(row[turn]))
+        way = frame[:3, :3].T @ (end.point - frame[:3, 3])
         row |= dict(zip(slides if end is ends[-1] else slides[:2], map(float, way), strict=False))
-        here = _moved(here, np.array([way[0], way[1], 0.0]), np.eye(3))
+        frame = _moved(frame, np.array([way[0], way[1], 0.0]), np.eye(3))
         rows.append(row)
     return Links(tuple(rows), start)
 
@@ -282,15 +282,15 @@ def _moved(frame: Array, slide: Array, R: Array) -> Array:
 
 def origins(robot: Robot) -> Links:
     """Return the origins of a robot's joints, whose own zeros belong to them."""
-    here = base_and_flange(robot)[0]
+    frame = base_and_flange(robot)[0]
     passed, rows = list(robot.base_elements), []
     for link in robot.link_elements:
         moving = next(i for i, element in enumerate(link) if element.variable is not None)
-        there = at_zero(robot, [*passed, *link[: moving + 1]])
-        place = np.linalg.inv(here) @ there
+        next_frame = at_zero(robot, [*passed, *link[: moving + 1]])
+        place = np.linalg.inv(frame) @ next_frame
         row = dict(zip("xyz", map(float, place[:3, 3]), strict=True))
         row |= dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(place[:3, :3]), strict=True))
         rows.append(row | dict(zip(("axis_x", "axis_y", "axis_z"), link[moving].axis or (0.0, 0.0, 1.0), strict=True)))
-        here = there
+        frame = next_frame
         passed += link
     return Links(tuple(rows))

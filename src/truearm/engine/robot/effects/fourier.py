@@ -39,9 +39,9 @@ class Fourier(LinearEffect):
 
     def shapes(self, at: Postures) -> Rates:
         """Return sines and cosines of multiples of the joint positions."""
-        found = {}
+        shapes = {}
         for i in self.layout.turning:
             for k in HARMONICS:
-                found[f"fourier_sin{k}_{i + 1}"] = {i: np.sin(k * at.joints[:, i])}
-                found[f"fourier_cos{k}_{i + 1}"] = {i: np.cos(k * at.joints[:, i])}
-        return found
+                shapes[f"fourier_sin{k}_{i + 1}"] = {i: np.sin(k * at.joints[:, i])}
+                shapes[f"fourier_cos{k}_{i + 1}"] = {i: np.cos(k * at.joints[:, i])}
+        return shapes

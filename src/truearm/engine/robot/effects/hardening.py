@@ -41,9 +41,9 @@ class Hardening(LinearEffect):
 
     def shapes(self, at: Postures) -> Rates:
         """Return the square, with its sign, and the cube of the moments."""
-        found = {}
+        shapes = {}
         for i in self.layout.turning:
             moment = effort(at, self.layout, i)
-            found[f"compliance_quadratic_{i + 1}"] = {i: moment * np.abs(moment)}
-            found[f"compliance_cubic_{i + 1}"] = {i: moment**3}
-        return found
+            shapes[f"compliance_quadratic_{i + 1}"] = {i: moment * np.abs(moment)}
+            shapes[f"compliance_cubic_{i + 1}"] = {i: moment**3}
+        return shapes

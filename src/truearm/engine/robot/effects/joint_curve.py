@@ -49,21 +49,21 @@ class JointCurve(LinearEffect):
 
     def shapes(self, at: Postures) -> Rates:
         """Return sines and cosines of multiples of the joint positions."""
-        found = {}
+        shapes = {}
         for i, names in self.terms.items():
             waves = curve_waves(at.joints[:, i], HIGHEST)
-            found.update({name: {i: wave} for name, wave in zip(names, waves, strict=True)})
-        return found
+            shapes.update({name: {i: wave} for name, wave in zip(names, waves, strict=True)})
+        return shapes
 
     def deflection(self, at: Postures, values: Mapping[str, float | Array]) -> Mapping[int, Array]:
         """Return the sums of the series of the joints that have one."""
         moved: dict[int, Array] = {}
         for i, names in self.terms.items():
-            given = [values[name] for name in names]
-            if any(isinstance(amount, np.ndarray) for amount in given):
-                amounts = np.concatenate(np.broadcast_arrays(*map(np.atleast_2d, given)), axis=1)
+            coefficients = [values[name] for name in names]
+            if any(isinstance(amount, np.ndarray) for amount in coefficients):
+                amounts = np.concatenate(np.broadcast_arrays(*map(np.atleast_2d, coefficients)), axis=1)
             else:
-                amounts = np.array(given)
+                amounts = np.array(coefficients)
             used = np.flatnonzero(amounts.reshape(-1, len(names)).any(axis=0))
             if not len(used):
                 continue

@@ -32,8 +32,8 @@ class ThermalGrowth(LinearEffect):
         """Return length times warming; nothing where the temperature is not known."""
         if at.temperature is None:
             return {}
-        found: dict[str, dict[int, Array]] = {}
+        shapes: dict[str, dict[int, Array]] = {}
         for number, (joint, length) in enumerate(self.layout.lengths):
             grown = length * (at.temperature - REFERENCE)
-            found.setdefault(f"thermal_growth_{joint + 1}", {})[self.layout.length(number)] = grown
-        return found
+            shapes.setdefault(f"thermal_growth_{joint + 1}", {})[self.layout.length(number)] = grown
+        return shapes

@@ -40,11 +40,11 @@ class TransmissionError(LinearEffect):
 
     def shapes(self, at: Postures) -> Rates:
         """Return the sines and cosines of the joint positions times the periods in a turn."""
-        found = {}
+        shapes = {}
         for i, periods in self._geared():
-            found[f"transmission_sin_{i + 1}"] = {i: np.sin(periods * at.joints[:, i])}
-            found[f"transmission_cos_{i + 1}"] = {i: np.cos(periods * at.joints[:, i])}
-        return found
+            shapes[f"transmission_sin_{i + 1}"] = {i: np.sin(periods * at.joints[:, i])}
+            shapes[f"transmission_cos_{i + 1}"] = {i: np.cos(periods * at.joints[:, i])}
+        return shapes
 
     def _geared(self) -> Iterator[tuple[int, int]]:
         return ((i, periods) for i, periods in enumerate(self.layout.transmission_periods) if periods is not None)

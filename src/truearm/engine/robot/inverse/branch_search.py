@@ -153,11 +153,11 @@ class Candidates:
         np.minimum.at(nearest, self.pose[good], np.abs(self.joints - self._seed[self.pose]).max(axis=1)[good])
         return nearest
 
-    def found(self) -> NDArray[np.bool_]:
+    def reached_branches(self) -> NDArray[np.bool_]:
         """Return which branches reach which poses, ``(n, 8)``."""
-        found = np.zeros((len(self._seed), len(BRANCHES)), dtype=bool)
-        found[self.pose[self.reached], self.number[self.reached]] = True
-        return found
+        branches = np.zeros((len(self._seed), len(BRANCHES)), dtype=bool)
+        branches[self.pose[self.reached], self.number[self.reached]] = True
+        return branches
 
     def best(self, wanted: int | None) -> NDArray[np.intp]:
         """Return the one candidate of each pose to answer with, in the order of the poses."""
@@ -192,9 +192,9 @@ class Candidates:
 
     def _any(self, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which poses have such a candidate, ``(n,)``."""
-        found = np.zeros(len(self._seed), dtype=bool)
-        found[self.pose[good]] = True
-        return found
+        reached = np.zeros(len(self._seed), dtype=bool)
+        reached[self.pose[good]] = True
+        return reached
 
 
 #: A nominal start that misses by more [reach lengths, rad] is no start but for the nearest pose.
@@ -253,8 +253,8 @@ class BranchSearch:
         slot = np.argmin(cost, axis=1)
         self._pool.add(every, self._joints[every, slot])
         # A seed that is nearly there is a start of its own: at its end a branch of the nominal arm may be missing.
-        there = np.flatnonzero(_missed(self._task, self._turned) < _USABLE_START)
-        self._pool.add(there, self._turned[there])
+        usable = np.flatnonzero(_missed(self._task, self._turned) < _USABLE_START)
+        self._pool.add(usable, self._turned[usable])
         missing = ~self._pool.satisfied(wanted)
         if missing.any():
             near = self._add_all(missing)
@@ -266,7 +266,7 @@ class BranchSearch:
                 expected[:] = False
                 expected[:, wanted] = possible
             else:
-                expected[~missing | self._pool.found().any(axis=1)] = False
+                expected[~missing | self._pool.reached_branches().any(axis=1)] = False
             self._look_again(expected, thorough=True)
         if wanted is None:
             self._add_nearer()
@@ -320,7 +320,7 @@ class BranchSearch:
         edge = ~self._exact[pose, slot]
         for side in (2, 4):
             expected[pose[edge], number[edge] ^ side] = True
-        expected[near.any(axis=1) & ~self._pool.found().any(axis=1)] = True
+        expected[near.any(axis=1) & ~self._pool.reached_branches().any(axis=1)] = True
         return expected
 
     def _singular(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -334,15 +334,15 @@ class BranchSearch:
 
     def _lost(self, expected: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the poses that lack a branch they are expected to have, ``(n,)``."""
-        return np.asarray((expected & ~self._pool.found()).any(axis=1))
+        return np.asarray((expected & ~self._pool.reached_branches()).any(axis=1))
 
     def _look_again(self, expected: NDArray[np.bool_], thorough: bool) -> None:
         """Look for branches ``(n, 8)`` that were expected and not found."""
         pool = self._pool
-        pose, number = np.nonzero(expected & ~pool.found())
+        pose, number = np.nonzero(expected & ~pool.reached_branches())
         pool.add(pose, self._by_fake_targets(pose, number), bold=True, most=BOLD_STEPS)
         # From candidates that only came near too, where one branch matters: it finds the last few in ten thousand.
-        unreached = ~np.asarray(pool.found().any(axis=1))
+        unreached = ~np.asarray(pool.reached_branches().any(axis=1))
         origins = pool.reached | unreached[pool.pose] | thorough
         tried = _once(pool, np.flatnonzero(self._lost(expected)[pool.pose] & origins))
         value, motion = weakest_motion(self._task.of(pool.pose[tried]), pool.variables[:, tried])
@@ -366,12 +366,12 @@ class BranchSearch:
         shifted, every = wanted, np.arange(len(pose))
         for _ in range(_FAKE_TARGETS):
             x, y, z, position = np.moveaxis(shifted[:, :3, :], 0, -1).transpose(1, 0, 2)
-            found, there, exact = self._nominal(
+            solutions, numbers, exact = self._nominal(
                 PoseTask(part.robot, part.target, "full", position, (x, y, z), part.length)
             )
-            slot = np.argmin(np.where(there < 0, 1e6, 1e2 * (there != number[:, None]) + 1e1 * ~exact), axis=1)
-            none = there[every, slot] < 0
-            joints = np.where(none[:, None], joints, found[every, slot])
+            slot = np.argmin(np.where(numbers < 0, 1e6, 1e2 * (numbers != number[:, None]) + 1e1 * ~exact), axis=1)
+            none = numbers[every, slot] < 0
+            joints = np.where(none[:, None], joints, solutions[every, slot])
             kinematics = part.forward_kinematics(part.variables(joints))
             shifted = wanted @ np.linalg.inv(homogeneous(kinematics.matrix(), kinematics.position.T)) @ shifted
         return joints

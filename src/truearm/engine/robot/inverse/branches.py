@@ -187,16 +187,16 @@ class ClosedForm:
         from eaik.pybindings.EAIK import Robot as Arm  # a tenth of the size of the package, and no mesh libraries
 
         zero = np.zeros((1, 6))
-        nominal, now = robot.rigid.trunk.forward_kinematics(zero.T), robot.rigid.forward_kinematics(zero, target)
+        nominal, whole = robot.rigid.trunk.forward_kinematics(zero.T), robot.rigid.forward_kinematics(zero, target)
         base, wrist = _end_frames(nominal)
         axes = joint_axes(nominal)
         directions = np.column_stack([base[:3, :3].T @ line.along[:, 0] for line in axes]).round(12)
         points = [base[:3, :3].T @ (point - base[:3, 3]) for point in (*(a.point[:, 0] for a in axes), wrist[:3, 3])]
         offsets = np.diff(np.array([np.zeros(3), *points]), axis=0).T
         self._arm: Any = Arm(directions, offsets, base[:3, :3].T @ wrist[:3, :3], [], True)
-        self._from_world, last = (np.linalg.inv(frame) for frame in _end_frames(now))
+        self._from_world, last = (np.linalg.inv(frame) for frame in _end_frames(whole))
         tip = np.eye(4)
-        tip[:3, :3], tip[:3, 3] = now.matrix()[0], now.position[:, 0]
+        tip[:3, :3], tip[:3, 3] = whole.matrix()[0], whole.position[:, 0]
         self._behind = np.linalg.inv(last @ tip)
 
     @property
@@ -207,11 +207,11 @@ class ClosedForm:
     def starts(self, position: Array, rotation: Array) -> Starts:
         """Return the solutions for poses of the tip in the world, ``(n, 3)`` [m] and ``(n, 3, 3)``."""
         poses = homogeneous(rotation, position)
-        found = self._arm.calculate_IK_batched(list(self._from_world @ poses @ self._behind), _THREADS)
+        solutions = self._arm.calculate_IK_batched(list(self._from_world @ poses @ self._behind), _THREADS)
         joints = np.full((len(position), SLOTS, 6), np.nan)
         nearest = np.ones((len(position), SLOTS), dtype=bool)
-        every = [solution.Q for solution in found]
-        flags = [solution.is_LS for solution in found]
+        every = [solution.Q for solution in solutions]
+        flags = [solution.is_LS for solution in solutions]
         filled = np.arange(SLOTS) < np.array([len(q) for q in every], dtype=int)[:, None]
         if filled.any():
             joints[filled] = np.concatenate([q for q in every if len(q)])

@@ -225,13 +225,13 @@ def _task(
     return PoseTask(robot, target, orientation, np.ascontiguousarray(p.T), (x, y, z), reach(robot, target))
 
 
-def _array(given: ArrayLike, parameter: str, *shape: int) -> Array:
+def _array(value: ArrayLike, parameter: str, *shape: int) -> Array:
     """Return an array of one row a pose; a single pose may come without its axis."""
-    return number_array([given] if axes(given) == len(shape) else given, parameter, ("n", *shape))
+    return number_array([value] if axes(value) == len(shape) else value, parameter, ("n", *shape))
 
 
-def _rotations(given: ArrayLike, count: int) -> Array:
-    R = _array(given, "rotations", 3, 3)
+def _rotations(value: ArrayLike, count: int) -> Array:
+    R = _array(value, "rotations", 3, 3)
     if len(R) != count:
         raise InputError(
             "there are not as many rotations as positions", parameter="rotations", came=len(R), allowed=f"{count}"

@@ -80,8 +80,8 @@ class PoseTask:
             turn = _turned(cross(z, self.rotation[2]), dot(z, self.rotation[2]), x)
             return np.concatenate([away, dot(turn, x)[None], dot(turn, y)[None]]).T
         pairs = list(zip(kinematics.rotation, self.rotation, strict=True))
-        sine = 0.5 * sum((cross(now, wanted) for now, wanted in pairs), np.zeros(()))
-        cosine = 0.5 * (sum((dot(now, wanted) for now, wanted in pairs), np.zeros(())) - 1.0)
+        sine = 0.5 * sum((cross(reached, wanted) for reached, wanted in pairs), np.zeros(()))
+        cosine = 0.5 * (sum((dot(reached, wanted) for reached, wanted in pairs), np.zeros(())) - 1.0)
         return np.concatenate([away, _turned(sine, cosine, x)]).T
 
     def distances(self, error: Array) -> tuple[Array, Array]:
@@ -160,9 +160,9 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False, most: int = MOST
             that is faster by far, and it ends anywhere if there is no solution.
         most: Steps at most.
     """
-    part, now = task, task.variables(starts)
-    found, damping = now.copy(), np.ones(len(starts))
-    kinematics = part.forward_kinematics(now)
+    part, current = task, task.variables(starts)
+    solution, damping = current.copy(), np.ones(len(starts))
+    kinematics = part.forward_kinematics(current)
     e, jacobian = part.error(kinematics), part.jacobian(kinematics)
     error, active = e.copy(), np.arange(len(starts))
     for number in range(most):
@@ -172,20 +172,20 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False, most: int = MOST
             (size > CONVERGED) & (gradient > _LEVEL_GRADIENT * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
         )
         if not going.all():
-            active, now, e, jacobian = active[going], now[:, going], e[going], jacobian[going]
+            active, current, e, jacobian = active[going], current[:, going], e[going], jacobian[going]
             damping, size, part = damping[going], size[going], part.of(np.flatnonzero(going))
         if not len(active):
             break
-        tried = part.advanced(now, _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2))
+        tried = part.advanced(current, _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2))
         kinematics = part.forward_kinematics(tried)
         tried_error = part.error(kinematics)
         better = (np.linalg.norm(tried_error, axis=1) < size) | bold
         damping = np.where(better, np.maximum(damping / 5, _DAMPING[0]), damping * 10)
-        now, e = np.where(better, tried, now), np.where(better[:, None], tried_error, e)
+        current, e = np.where(better, tried, current), np.where(better[:, None], tried_error, e)
         tilting = part.tilting(tried) if number >= _STEPS_WITHOUT_TILTS else None
         jacobian = np.where(better[:, None, None], part.jacobian(kinematics, tilting), jacobian)
-        found[:, active], error[active] = now, e
-    return Solved(found, error)
+        solution[:, active], error[active] = current, e
+    return Solved(solution, error)
 
 
 def smallest_singular_value(task: PoseTask, variables: Array) -> Array:

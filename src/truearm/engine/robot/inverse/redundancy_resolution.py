@@ -106,5 +106,5 @@ def _solved(A: Array, M: Array, first: Array, second: Array) -> tuple[Array, Arr
     whole[:, :joints, :joints] = np.eye(joints) - M
     whole[:, :joints, joints:] = -A.swapaxes(1, 2)
     whole[:, joints:, :joints] = A
-    found = np.linalg.solve(whole, np.concatenate([first, second], axis=1)[:, :, None])[:, :, 0]
-    return found[:, :joints], found[:, joints:]
+    solution = np.linalg.solve(whole, np.concatenate([first, second], axis=1)[:, :, None])[:, :, 0]
+    return solution[:, :joints], solution[:, joints:]

@@ -18,7 +18,7 @@ from truearm.engine.robot.robot_file.reading import read_robot
 _BEGINNING: Final = 4096
 #: Of an id that was half given, how many letters and digits are needed, and of one that stands in a longer name; how
 #: many ids are offered at most.
-_SHORTEST_HELD: Final = 2
+_SHORTEST_CONTAINED: Final = 2
 _SHORTEST_WITHIN: Final = 3
 _MOST_OFFERED: Final = 8
 _URDF: Final = re.compile(r".*\.(?:urdf|xml|xacro)", re.I | re.S)
@@ -101,11 +101,11 @@ def close_names(text: str) -> list[str]:
     taken for it, since arms of one series differ in their lengths.
     """
     asked = letters(text)
-    held = [name for name in library() if len(asked) >= _SHORTEST_HELD and asked in letters(name)]
-    if not held:
-        held = [name for name in library() if len(name) >= _SHORTEST_WITHIN and letters(name) in asked]
-        held.sort(key=len, reverse=True)
-    return held[:_MOST_OFFERED] or nearest_names(text, library())
+    similar = [name for name in library() if len(asked) >= _SHORTEST_CONTAINED and asked in letters(name)]
+    if not similar:
+        similar = [name for name in library() if len(name) >= _SHORTEST_WITHIN and letters(name) in asked]
+        similar.sort(key=len, reverse=True)
+    return similar[:_MOST_OFFERED] or nearest_names(text, library())
 
 
 def letters(text: str) -> str:

@@ -31,9 +31,9 @@ def wider_limits_notices(robot: Robot) -> list[Notice]:
     if [joint.kind for joint in known.joints] != [joint.kind for joint in robot.joints]:
         return []
     wider = [
-        f"joint {number} {_words(joint)} ({_words(there)} in the library)"
-        for number, (joint, there) in enumerate(zip(robot.joints, known.joints, strict=True), 1)
-        if _is_wider(joint, there)
+        f"joint {number} {_words(joint)} ({_words(in_library)} in the library)"
+        for number, (joint, in_library) in enumerate(zip(robot.joints, known.joints, strict=True), 1)
+        if _is_wider(joint, in_library)
     ]
     if not wider:
         return []

@@ -76,20 +76,20 @@ def factor_from(entry: Sequence[str] | str, count: int, where: str, cure: str) -
 
 def _unpacked(text: str, count: int, where: str, cure: str) -> Factor:
     try:
-        found = base64.b64decode(text, validate=True)
+        content = base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError):
-        found = None
+        content = None
     numbers = count * (count + 1) // 2
     length = math.ceil(numbers * len(_PLACES) / 8)
-    if found is None or len(found) != length:
+    if content is None or len(content) != length:
         raise InputError(
             "this is no text of correlations of so many parameters",
             where=where,
-            came="other signs than those of base64" if found is None else counted(len(found), "byte"),
+            came="other signs than those of base64" if content is None else counted(len(content), "byte"),
             allowed=f"{length} bytes in base64",
             cure=cure,
         )
-    bits = np.unpackbits(np.frombuffer(found, dtype=np.uint8), count=numbers * len(_PLACES)).reshape(numbers, -1)
+    bits = np.unpackbits(np.frombuffer(content, dtype=np.uint8), count=numbers * len(_PLACES)).reshape(numbers, -1)
     steps = bits @ (1 << _PLACES) - _PER_ONE
     if np.abs(steps).max(initial=0) > _PER_ONE:
         raise InputError("correlations are -1 to 1", where=where, cure=cure)
@@ -142,31 +142,31 @@ def curve_entries(known: Mapping[str, Parameter], joints: int) -> tuple[list[dic
         known: Parameters that differ from the plain nominal ones.
         joints: How many joints there are.
     """
-    made: list[dict[str, object]] = []
-    held: set[str] = set()
+    entries: list[dict[str, object]] = []
+    names: set[str] = set()
     for number in range(1, joints + 1):
-        mine = [known[name] for name in curve_names(number) if name in known]
-        if not mine:
+        parameters = [known[name] for name in curve_names(number) if name in known]
+        if not parameters:
             continue
         entry: dict[str, object] = {
             "joint": number,
-            "terms": " ".join(p.name.removeprefix("curve_").removesuffix(f"_{number}") for p in mine),
+            "terms": " ".join(p.name.removeprefix("curve_").removesuffix(f"_{number}") for p in parameters),
         }
         columns: dict[str, Sequence[float | None]] = {
-            "nominal": [written(p.nominal, "deg") for p in mine],
-            "value": [written(p.value, "deg") for p in mine],
-            "prior": [written(p.prior, "deg") for p in mine],
-            "deviation": [None if p.deviation is None else written(p.deviation, "deg") for p in mine],
-            "informed": [p.informed for p in mine],
+            "nominal": [written(p.nominal, "deg") for p in parameters],
+            "value": [written(p.value, "deg") for p in parameters],
+            "prior": [written(p.prior, "deg") for p in parameters],
+            "deviation": [None if p.deviation is None else written(p.deviation, "deg") for p in parameters],
+            "informed": [p.informed for p in parameters],
         }
         if any(None in column and any(v is not None for v in column) for column in columns.values()):
             continue  # such parameters stand one by one
         if not any(columns["nominal"]):
             del columns["nominal"]
         entry |= {name: " ".join(map(repr, column)) for name, column in columns.items() if None not in column}
-        made.append(entry)
-        held |= {p.name for p in mine}
-    return made, held
+        entries.append(entry)
+        names |= {p.name for p in parameters}
+    return entries, names
 
 
 def curve_parameters(
@@ -183,20 +183,20 @@ def curve_parameters(
         InputError: If there is no such joint or term, one stands twice, a list has other numbers than it should, or one
             of them is larger than any curve.
     """
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
     for place, entry in enumerate(entries, 1):
-        here = f"{where}, joint_curves[{place}]"
+        location = f"{where}, joint_curves[{place}]"
         if effect is None:
             raise InputError(
                 "the robot has no curves of joints",
-                where=here,
+                where=location,
                 cure=f"Add the joint effect {JointCurve.name} to the entry effects.",
             )
         turning = [joint + 1 for joint in effect.terms]
         if entry.joint not in turning:
             raise InputError(
                 "there is no such turning joint",
-                where=f"{here}.joint",
+                where=f"{location}.joint",
                 came=entry.joint,
                 allowed=", ".join(map(str, turning)) or "none",
             )
@@ -206,25 +206,25 @@ def curve_parameters(
             if name not in plain:
                 raise InputError(
                     "there is no such term of a curve",
-                    where=f"{here}.terms",
+                    where=f"{location}.terms",
                     came=name.removeprefix("curve_").removesuffix(f"_{entry.joint}"),
                     allowed=f"sin1, cos1 to sin{HIGHEST}, cos{HIGHEST}",
                 )
-            if name in found or names.count(name) > 1:
-                raise InputError("a term of a curve stands twice", where=f"{here}.terms", came=name)
+            if name in parameters or names.count(name) > 1:
+                raise InputError("a term of a curve stands twice", where=f"{location}.terms", came=name)
         columns = {
-            column: _numbers(getattr(entry, column), len(names), f"{here}.{column}", least=column in _POSITIVE)
+            column: _numbers(getattr(entry, column), len(names), f"{location}.{column}", least=column in _POSITIVE)
             for column in _COLUMNS
             if getattr(entry, column) is not None
         }
         for number, name in enumerate(names):
             stated = {
-                column: _share(values[number], f"{here}.{column}")
+                column: _share(values[number], f"{location}.{column}")
                 if column == "informed"
-                else coefficient_si(values[number], angle, f"{here}.{column}", deviation=column in _POSITIVE)
+                else coefficient_si(values[number], angle, f"{location}.{column}", deviation=column in _POSITIVE)
                 for column, values in columns.items()
             }
-            found[name] = Parameter(
+            parameters[name] = Parameter(
                 name,
                 plain[name].unit,
                 plain[name].group,
@@ -234,7 +234,7 @@ def curve_parameters(
                 deviation=stated.get("deviation"),
                 informed=stated.get("informed"),
             )
-    return found
+    return parameters
 
 
 def coefficient_si(value: float, unit: str, where: str, *, deviation: bool) -> float:

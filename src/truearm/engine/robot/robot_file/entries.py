@@ -109,7 +109,7 @@ _STRONGEST: Final = 1e6
 _STEPS: Final = 361
 #: A bar on a square millimetre [N].
 _BAR_MM2: Final = 0.1
-_HOW: Final = "free_length; or length and force; or length, pressure and area"
+_DEFINED_BY: Final = "free_length; or length and force; or length, pressure and area"
 
 
 class AnchorEntry(BaseModel):
@@ -171,15 +171,15 @@ class BalancerEntry(BaseModel):
                 if same
                 else "Exchange fixed and moving.",
             )
-        given = {
+        keys = {
             name for name in ("free_length", "length", "force", "pressure", "area") if getattr(self, name) is not None
         }
-        if given not in ({"free_length"}, {"length", "force"}, {"length", "pressure", "area"}):
+        if keys not in ({"free_length"}, {"length", "force"}, {"length", "pressure", "area"}):
             raise InputError(
                 "this does not say how hard the balancer pulls, or says it twice",
                 where=where,
-                came=", ".join(sorted(given)) or "none of them",
-                allowed=_HOW,
+                came=", ".join(sorted(keys)) or "none of them",
+                allowed=_DEFINED_BY,
             )
         at = self.free_length if self.length is None else self.length
         force = self.force or 0.0
@@ -215,7 +215,7 @@ def check_anchors(robot: Robot, where: str) -> None:
         InputError: Naming the balancer.
     """
     for number, balancer in enumerate(robot.balancers, 1):
-        here = f"{where}, balancers[{number}]"
+        location = f"{where}, balancers[{number}]"
         lower, upper = balancer.fixed, balancer.moving
         if upper.link == lower.link + 1 and robot.joints[lower.link].kind == "revolute":
             axis, origin = _axis(robot, upper.link)
@@ -224,7 +224,7 @@ def check_anchors(robot: Robot, where: str) -> None:
                 if away < _NEAREST:
                     raise InputError(
                         "the anchor lies on the axis that the balancer should relieve",
-                        where=f"{here}.{name}.point",
+                        where=f"{location}.{name}.point",
                         came=f"{away * 1e3:.3g} mm from the axis of {robot.joints[lower.link].name}",
                         allowed=f"{_NEAREST * 1e3:g} mm or more: a force through the axis has no lever",
                         cure="Take both anchors from the maker's drawing, in the frames of their links.",
@@ -233,7 +233,7 @@ def check_anchors(robot: Robot, where: str) -> None:
         if shortest < _NEAREST:
             raise InputError(
                 "both anchors are one point in some posture",
-                where=here,
+                where=location,
                 came=f"{shortest * 1e3:.3g} mm between them",
                 allowed=f"{_NEAREST * 1e3:g} mm or more within the limits of the joints",
                 cure="Take both anchors from the maker's drawing, in the frames of their links.",
@@ -282,12 +282,12 @@ def balancer_entry(balancer: Balancer) -> dict[str, Any]:
     def anchor(of: Anchor) -> dict[str, Any]:
         return {"link": of.link, "point": [written(v, "mm") for v in of.point]}
 
-    made: dict[str, Any] = {"name": balancer.name}
-    made |= {"fixed": anchor(balancer.fixed), "moving": anchor(balancer.moving)}
-    made["stiffness"] = balancer.stiffness / 1e3
+    content: dict[str, Any] = {"name": balancer.name}
+    content |= {"fixed": anchor(balancer.fixed), "moving": anchor(balancer.moving)}
+    content["stiffness"] = balancer.stiffness / 1e3
     if not balancer.force:
-        return made | {"free_length": written(balancer.length, "mm")}
-    return made | {"length": written(balancer.length, "mm"), "force": balancer.force}
+        return content | {"free_length": written(balancer.length, "mm")}
+    return content | {"length": written(balancer.length, "mm"), "force": balancer.force}
 
 
 # The entry `controller` of a robot file: how the robot's controller counts joints, and where it has its frames.
@@ -357,13 +357,13 @@ class KinematicsEntry(BaseModel):
     joints: list[KinematicsRow] = []
 
 
-def _said(said: object) -> str | KinematicsEntry:
+def _stated(value: object) -> str | KinematicsEntry:
     """Return a word, the name of a file or named entries as they are; of a union every fault would name all of them."""
-    if isinstance(said, Mapping):
-        return KinematicsEntry.model_validate(said)
-    if isinstance(said, str) and said.strip():
-        return said
-    raise InputError("this does not say with what the controller computes", came=said, allowed=ALLOWED)
+    if isinstance(value, Mapping):
+        return KinematicsEntry.model_validate(value)
+    if isinstance(value, str) and value.strip():
+        return value
+    raise InputError("this does not say with what the controller computes", came=value, allowed=ALLOWED)
 
 
 class ControllerEntry(BaseModel):
@@ -374,7 +374,7 @@ class ControllerEntry(BaseModel):
 
     model_config = STRICT
     source: str = ""
-    kinematics: Annotated[str | KinematicsEntry, PlainValidator(_said)] = "unknown"
+    kinematics: Annotated[str | KinematicsEntry, PlainValidator(_stated)] = "unknown"
     joints: list[CountedJoint] = []
     base: Place = Place()
     flange: Place = Place()
@@ -395,22 +395,22 @@ class ControllerEntry(BaseModel):
         counted: dict[int, CountedJoint] = {}
         couplings: dict[int, dict[int, float]] = {}
         for place, entry in enumerate(self.joints, 1):
-            here = f"{where}.joints[{place}]"
-            number = _number(entry.joint, numbers, here)
+            location = f"{where}.joints[{place}]"
+            number = _number(entry.joint, numbers, location)
             if number in counted:
-                raise InputError("a joint appears twice", where=here, came=entry.joint)
+                raise InputError("a joint appears twice", where=location, came=entry.joint)
             counted[number] = entry
             unit, other = ("degree", "mm") if joints[number - 1].kind == "revolute" else ("mm", "degree")
             if getattr(entry, f"pulses_per_{other}") is not None:
                 raise InputError(
                     f"the joint is {joints[number - 1].kind}",
-                    where=here,
+                    where=location,
                     came=f"pulses_per_{other}",
                     allowed=f"pulses_per_{unit}",
                 )
-            shares = {_number(name, numbers, f"{here}.coupling"): share for name, share in entry.coupling.items()}
+            shares = {_number(name, numbers, f"{location}.coupling"): share for name, share in entry.coupling.items()}
             for coupled in shares:
-                _check_coupled(joints, number, coupled, f"{here}.coupling")
+                _check_coupled(joints, number, coupled, f"{location}.coupling")
             if any(shares.values()):
                 couplings[number] = {coupled: share for coupled, share in shares.items() if share}
 
@@ -428,7 +428,7 @@ class ControllerEntry(BaseModel):
         signs = tuple(counted[n].sign if n in counted else 1 for n in everyone)
         zeros = tuple(zero(n) if n in counted else 0.0 for n in everyone)
         known = tuple(pulses(n) if n in counted else None for n in everyone)
-        made = Controller(
+        result = Controller(
             signs=signs if -1 in signs else (),
             zeros=zeros if any(zeros) else (),
             couplings=couplings,
@@ -438,13 +438,13 @@ class ControllerEntry(BaseModel):
             source=self.source,
             kinematics=self._kinematics(joints, length, angle, f"{where}.kinematics"),
         )
-        if np.linalg.cond(made.coupling(len(joints))) > _CONDITION:
+        if np.linalg.cond(result.coupling(len(joints))) > _CONDITION:
             raise InputError(
                 "the couplings cannot be inverted: other joint positions give the same counts",
                 where=f"{where}.joints",
                 came="; ".join(f"{e.joint} counts {', '.join(e.coupling)}" for e in self.joints if e.coupling),
             )
-        return made
+        return result
 
     def _kinematics(self, joints: Sequence[Joint], length: str, angle: str, where: str) -> ControllerKinematics:
         """Return with what the controller computes; the name of a file says nothing yet."""
@@ -513,29 +513,29 @@ def controller_entry(controller: Controller, joints: Sequence[Joint]) -> dict[st
             row[name] = written(pulses, unit)
         if len(row) > 1:
             rows.append(row)
-    made: dict[str, Any] = {"source": controller.source} if controller.source else {}
+    content: dict[str, Any] = {"source": controller.source} if controller.source else {}
     if rows:
-        made["joints"] = rows
+        content["joints"] = rows
     if controller.kinematics != STATED["unknown"]:
-        made["kinematics"] = _kinematics_entry(controller.kinematics)
+        content["kinematics"] = _kinematics_entry(controller.kinematics)
     frames = {"base": controller.base, "flange": controller.flange}
-    return made | {name: place_entry(place) for name, place in frames.items() if place != IDENTITY}
+    return content | {name: place_entry(place) for name, place in frames.items() if place != IDENTITY}
 
 
 def _kinematics_entry(kinematics: ControllerKinematics) -> str | dict[str, Any]:
     """Return the entry of what a controller computes with; what is known in a word is one."""
     if kinematics == STATED.get(kinematics.kind):
         return kinematics.kind
-    made: dict[str, Any] = {"kind": kinematics.kind}
-    made |= {"source": kinematics.source} if kinematics.source else {}
-    made |= {"identity": dict(kinematics.identity)} if kinematics.identity else {}
+    content: dict[str, Any] = {"kind": kinematics.kind}
+    content |= {"source": kinematics.source} if kinematics.source else {}
+    content |= {"identity": dict(kinematics.identity)} if kinematics.identity else {}
     if kinematics.rows:
         units = {"d": "mm", "a": "mm"}
-        made["joints"] = [
+        content["joints"] = [
             {column: written(value, units.get(column, "deg")) for column, value in row.items()}
             for row in kinematics.rows
         ]
-    return made
+    return content
 
 
 def controller_summary(kinematics: ControllerKinematics) -> dict[str, Any]:
@@ -587,8 +587,8 @@ class ReachEntry(BaseModel):
 
 def reach_entry(reach: Reach) -> dict[str, Any]:
     """Return the entry of a reach, in mm."""
-    made: dict[str, Any] = {"distance": written(reach.distance, "mm")}
-    return made if reach.point is None else made | {"from": f"axis-{reach.axis}", "to": reach.point}
+    content: dict[str, Any] = {"distance": written(reach.distance, "mm")}
+    return content if reach.point is None else content | {"from": f"axis-{reach.axis}", "to": reach.point}
 
 
 def reach_summary(reach: Reach | None) -> dict[str, Any]:

@@ -147,18 +147,18 @@ def _refuse_unsound(content: RobotFile, joints: Sequence[Joint], where: str) -> 
 
 def _with_controller(robot: Robot, content: RobotFile, where: str) -> Robot:
     """Return a robot with what its controller computes with, which the file has in rows or names another file for."""
-    entry, here = content.controller.kinematics, f"{where}, controller.kinematics"
+    entry, location = content.controller.kinematics, f"{where}, controller.kinematics"
     if entry in STATED if isinstance(entry, str) else not entry.joints:
         return robot
     from truearm.engine.robot.controller_kinematics import refuse_rows_of_another_type, with_controller_kinematics
 
     if not isinstance(entry, str):
-        refuse_rows_of_another_type(robot, here)
+        refuse_rows_of_another_type(robot, location)
         return robot
     try:
         return with_controller_kinematics(robot, entry, Path(where).parent)
     except InputError as error:
-        name_place(error, f"{here}: {error.where}")
+        name_place(error, f"{location}: {error.where}")
         raise
 
 

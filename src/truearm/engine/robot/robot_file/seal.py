@@ -33,8 +33,8 @@ _BESIDE: Final = (
 
 def sealed(robot: Robot, proof: Proof) -> Robot:
     """Return a robot with what is known of its calibration, which is about the values that it has now."""
-    made = replace(robot, proof=proof)
-    return replace(made, proof=replace(proof, digest=_digest(made)))
+    unsigned = replace(robot, proof=proof)
+    return replace(unsigned, proof=replace(proof, digest=_digest(unsigned)))
 
 
 def is_intact(robot: Robot) -> bool:

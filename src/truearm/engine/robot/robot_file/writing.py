@@ -48,7 +48,7 @@ def robot_text(robot: Robot) -> str:
     while token in f"{content}":
         token += "x-"
     yaml.dump(_without_rows(content, token, rows), stream)
-    return re.sub(f"(?<=[:-] ){token}([0-9]+)$", lambda found: rows[int(found[1])], stream.getvalue(), flags=re.M)
+    return re.sub(f"(?<=[:-] ){token}([0-9]+)$", lambda match: rows[int(match[1])], stream.getvalue(), flags=re.M)
 
 
 def _without_rows(entry: Any, token: str, rows: list[str]) -> Any:
@@ -165,18 +165,18 @@ def _flow(content: Mapping[str, Any]) -> CommentedMap:
     """Return a table that is written on one line."""
     from ruamel.yaml.comments import CommentedMap
 
-    made = CommentedMap(content)
-    made.fa.set_flow_style()
-    return made
+    mapping = CommentedMap(content)
+    mapping.fa.set_flow_style()
+    return mapping
 
 
 def _listed(content: Iterable[Any]) -> CommentedSeq:
     """Return a list that is written on one line."""
     from ruamel.yaml.comments import CommentedSeq
 
-    made = CommentedSeq(content)
-    made.fa.set_flow_style()
-    return made
+    sequence = CommentedSeq(content)
+    sequence.fa.set_flow_style()
+    return sequence
 
 
 def _mm(values: tuple[float, float, float]) -> CommentedSeq:
@@ -186,8 +186,8 @@ def _mm(values: tuple[float, float, float]) -> CommentedSeq:
 def _quoted(words: str) -> str:
     from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
-    made: str = DoubleQuotedScalarString(words)
-    return made
+    quoted: str = DoubleQuotedScalarString(words)
+    return quoted
 
 
 def _text(words: str) -> str:  # the writer leaves some texts without the quotes that its reader needs
@@ -229,60 +229,62 @@ def _joint(robot: Robot, j: Joint) -> CommentedMap:
 
 
 def _truth(robot: Robot, truth: Truth) -> dict[str, Any]:
-    made: dict[str, Any] = {
+    content: dict[str, Any] = {
         "source": truth.source,
         "values": {n: written(v, SHOWN_AS[robot.parameters[n].unit]) for n, v in truth.values.items()},
         "compliance": dict(truth.compliance),
     }
     for kind, angles in (("backlash", truth.backlash), ("clearance", truth.clearance)):
         if angles:
-            made[kind] = {n: written(v, SHOWN_AS["rad"]) for n, v in angles.items()}
-    return made
+            content[kind] = {n: written(v, SHOWN_AS["rad"]) for n, v in angles.items()}
+    return content
 
 
 def _parameter(p: Parameter) -> dict[str, Any]:
     unit = SHOWN_AS[p.unit]
-    made: dict[str, Any] = {
+    content: dict[str, Any] = {
         "unit": unit,
         "nominal": written(p.nominal, unit),
         "value": written(p.value, unit),
         "prior": written(p.prior, unit),
     }
     if p.deviation is not None:
-        made["deviation"] = written(p.deviation, unit)
+        content["deviation"] = written(p.deviation, unit)
     if p.informed is not None:
-        made["informed"] = p.informed
-    return made
+        content["informed"] = p.informed
+    return content
 
 
 def _proof(robot: Robot, proof: Proof) -> dict[str, Any]:
     """Return the entry of a proof; of a robot that has other joints or parameters by now, without what needs them."""
-    made: dict[str, Any] = {"status": proof.status}
+    content: dict[str, Any] = {"status": proof.status}
     if proof.errors:
-        made["errors"] = [{"code": error.code, "message": _text(error.message)} for error in proof.errors]
+        content["errors"] = [{"code": error.code, "message": _text(error.message)} for error in proof.errors]
     if proof.warnings:
-        made["warnings"] = [{"code": warning.code, "message": _text(warning.message)} for warning in proof.warnings]
+        content["warnings"] = [{"code": warning.code, "message": _text(warning.message)} for warning in proof.warnings]
     if proof.lower_bound:
-        made["lower_bound"] = True
+        content["lower_bound"] = True
     if proof.held:
-        made["held"] = _listed([_text(name) for name in proof.held])
+        content["held"] = _listed([_text(name) for name in proof.held])
     if len(proof.region) == len(robot.joints) and all(name in robot.parameters for name in proof.names):
         units = ["deg" if joint.kind == "revolute" else "mm" for joint in robot.joints]
-        made["region"] = [_listed([written(v, u) for v in one]) for one, u in zip(proof.region, units, strict=True)]
-        made["joint_error"] = _listed([written(v, u) for v, u in zip(proof.joint_error, units, strict=True)])
+        content["region"] = [_listed([written(v, u) for v in row]) for row, u in zip(proof.region, units, strict=True)]
+        content["joint_error"] = _listed([written(v, u) for v, u in zip(proof.joint_error, units, strict=True)])
         if proof.loads:
-            made["loads"] = [_listed(load) for load in proof.loads]
-        made["deviations"] = _flow(
+            content["loads"] = [_listed(load) for load in proof.loads]
+        content["deviations"] = _flow(
             {
                 _text(name): written(deviation, SHOWN_AS[robot.parameters[name].unit])
                 for name, deviation in zip(proof.names, proof.deviations, strict=True)
             }
         )
-        found = correlations_text(proof.factor)
-        made["correlations"] = _text(found) if isinstance(found, str) else [_text(row) for row in found]
+        correlations = correlations_text(proof.factor)
+        content["correlations"] = (
+            _text(correlations) if isinstance(correlations, str) else [_text(row) for row in correlations]
+        )
         if proof.measured:
-            made["measured"] = [
+            content["measured"] = [
                 _text(" ".join(position_text(v, u) for v, u in zip(row, units, strict=True))) for row in proof.measured
             ]
-    made["sha256"] = proof.digest
-    return made
+    content["sha256"] = proof.digest
+    return content

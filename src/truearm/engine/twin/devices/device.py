@@ -200,31 +200,31 @@ def recorded(
 
 
 def shown(
-    nominal: Robot, count: int, rng: np.random.Generator, visible: Visible, what: str
+    nominal: Robot, count: int, rng: np.random.Generator, visible: Visible, device: str
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return random configurations that show enough of the tool.
 
     Args:
         visible: Tells which targets of a robot are seen at joint positions ``(n, joints)``, ``(n, targets)``; a
             configuration that shows none of them is passed over.
-        what: Who looks, for messages.
+        device: Who looks, for messages.
 
     Returns:
         Joint positions ``(count, joints)``, and which targets are seen ``(count, targets)``.
     """
-    found, seen = [], []
+    joints, seen = [], []
     for _ in range(_DRAWS):
         drawn = nominal.random_configurations(_DRAWN, rng)
         sees = visible(nominal, drawn)
         some = sees.any(axis=1)
-        found.append(drawn[some])
+        joints.append(drawn[some])
         seen.append(sees[some])
-        if sum(map(len, found)) >= count:
-            return np.concatenate(found)[:count], np.concatenate(seen)[:count]
+        if sum(map(len, joints)) >= count:
+            return np.concatenate(joints)[:count], np.concatenate(seen)[:count]
     raise InputError(
-        f"{what} sees too few configurations of {nominal.name}",
+        f"{device} sees too few configurations of {nominal.name}",
         parameter="device",
-        came=f"{sum(map(len, found))} among {_DRAWN * _DRAWS} within the limits",
+        came=f"{sum(map(len, joints))} among {_DRAWN * _DRAWS} within the limits",
         allowed=f"{count} or more",
         cure="Lower `poses`, or take another device.",
     )

@@ -72,7 +72,7 @@ def postures_at(
     goals: Array,
     count: int,
     rng: np.random.Generator,
-    what: str,
+    device: str,
     facing: Array | None = None,
     within: float = np.pi / 3,
 ) -> tuple[NDArray[np.intp], Array]:
@@ -81,7 +81,7 @@ def postures_at(
     Args:
         goals: Places in the world ``(k, 3)`` [m].
         count: How many of them are needed.
-        what: Name of what is there, for messages.
+        device: Name of what is there, for messages.
         facing: Directions ``(k, 3)`` in the world along which the flange's z shall point, give or take `within` [rad];
             any if None.
 
@@ -92,13 +92,13 @@ def postures_at(
         InputError: If too few are within reach.
     """
     low, high = _limits(nominal)
-    room = _MARGIN * np.minimum(1.0, high - low)
-    found = np.full((len(goals), len(nominal.joints)), np.nan)
+    margin = _MARGIN * np.minimum(1.0, high - low)
+    joints = np.full((len(goals), len(nominal.joints)), np.nan)
     for _ in range(_ROUNDS):
-        reached = np.flatnonzero(np.isfinite(found[:, 0]))[:count]
+        reached = np.flatnonzero(np.isfinite(joints[:, 0]))[:count]
         if len(reached) == count:
-            return reached, found[reached]
-        open_goals = np.flatnonzero(np.isnan(found[:, 0]))[: 2 * count]
+            return reached, joints[reached]
+        open_goals = np.flatnonzero(np.isnan(joints[:, 0]))[: 2 * count]
         of = np.repeat(open_goals, max(2, min(_STARTS, _TOGETHER // len(open_goals))))
         q = nominal.random_configurations(len(of), rng)
         for _ in range(_STEPS):
@@ -110,18 +110,18 @@ def postures_at(
             q = q + _least(linear, missing)
         place, _ = nominal.world_poses(q, target)
         good = np.linalg.norm(goals[of] - place, axis=1) < 1e-8
-        good &= ((q > low + room) & (q < high - room)).all(axis=1)
+        good &= ((q > low + margin) & (q < high - margin)).all(axis=1)
         if facing is not None:
             pointing = nominal.world_poses(q)[1][:, :, 2]
             good &= np.einsum("ni,ni->n", pointing, facing[of]) > np.cos(within)
         for k in np.flatnonzero(good)[::-1].tolist():
-            found[of[k]] = q[k]
-    reached = np.flatnonzero(np.isfinite(found[:, 0]))[:count]
+            joints[of[k]] = q[k]
+    reached = np.flatnonzero(np.isfinite(joints[:, 0]))[:count]
     if len(reached) == count:
-        return reached, found[reached]
+        return reached, joints[reached]
     raise InputError(
         f"{nominal.name} does not reach enough places of the device",
-        where=what,
+        where=device,
         came=f"{len(reached)} of {len(goals)} places within reach",
         allowed=f"{count} or more",
         cure="Take a device that needs less room, or widen the joint limits in the robot file.",

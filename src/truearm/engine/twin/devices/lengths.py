@@ -55,26 +55,26 @@ class HexapodPoses(Device):
         frames = arm.frames(at)
         seen = np.stack([frames[name][:, :3, 3] for name in names], axis=1)
         low, high = np.array([joint.limits or (-np.inf, np.inf) for joint in nominal.joints]).T
-        there = np.linalg.norm(seen - goals, axis=2).max(axis=1) < _JOG_RANGE
-        kept = np.flatnonzero(there & ((at >= low) & (at <= high)).all(axis=1))[:count]
-        if len(kept) < count:
+        jogged = np.linalg.norm(seen - goals, axis=2).max(axis=1) < _JOG_RANGE
+        reached = np.flatnonzero(jogged & ((at >= low) & (at <= high)).all(axis=1))[:count]
+        if len(reached) < count:
             raise InputError(
                 f"{nominal.name} reaches too few poses of the device",
                 where=self.name,
-                came=f"{len(kept)} of {len(order)} tried, at {len(origins)} places of the fixture",
+                came=f"{len(reached)} of {len(order)} tried, at {len(origins)} places of the fixture",
                 allowed=f"{count} or more",
                 cure="Lower `poses`.",
             )
-        at, place = at[kept], place_of[order][kept]
+        at, place = at[reached], place_of[order][reached]
         frames = arm.frames(at)  # once more: what depends on the order depends on that of the poses taken
         seen = np.stack([frames[name][:, :3, 3] for name in names], axis=1)
-        pose = [wanted[k] for k in pose_of[order][kept]]
+        pose = [wanted[k] for k in pose_of[order][reached]]
         cups = (seen - np.array(base.translation)) @ turned - origins[place][:, None]
         feet, bar = triangle([DEVICE.base] * 3, "B"), sigma / _CUP_DEVIATION * rng.standard_normal((count, 6))
         read = []
-        for one, there, noise in zip(pose, cups, bar, strict=True):
-            lengths = leg_lengths(one.design, feet, there) + noise
-            read.append(tool_cups(one.design, one.solution, [DEVICE.base] * 3, [DEVICE.tool] * 3, lengths))
+        for hexapod, tool, noise in zip(pose, cups, bar, strict=True):
+            lengths = leg_lengths(hexapod.design, feet, tool) + noise
+            read.append(tool_cups(hexapod.design, hexapod.solution, [DEVICE.base] * 3, [DEVICE.tool] * 3, lengths))
         return recorded(
             nominal,
             self.name,
@@ -163,9 +163,9 @@ class KnownPoints(Device):
         goals = middle + np.einsum("nij,nj->ni", lying, on_plate)
         name = nominal.targets[0].name
         facing = -lying[:, :, 2]
-        kept, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=facing, within=_STAYS)
-        plate, on_plate = plate[kept], on_plate[kept]
-        wanted = goals[kept] + sigma * rng.standard_normal((count, 3))
+        reached, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=facing, within=_STAYS)
+        plate, on_plate = plate[reached], on_plate[reached]
+        wanted = goals[reached] + sigma * rng.standard_normal((count, 3))
         joints = jogged(nominal, arm, name, joints, lambda place: wanted - place)
         return recorded(
             nominal,
@@ -244,8 +244,8 @@ class Ballbar(Device):
         length = self.length + rng.uniform(-0.8, 0.8, len(cup)) * self.range
         name = nominal.targets[0].name
         goals = cups[cup] + length[:, None] * way
-        kept, joints = postures_at(nominal, name, goals, count, rng, self.name)
-        cup, length = cup[kept], length[kept]
+        reached, joints = postures_at(nominal, name, goals, count, rng, self.name)
+        cup, length = cup[reached], length[reached]
 
         def too_short(place: Array) -> Array:
             bar = place - cups[cup]

@@ -100,9 +100,9 @@ class PencilCircle(Device):
         around = 2 * np.pi * np.arange(each * fine) / (each * fine)
         path = self.radius * np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])
         places = middle + np.einsum("pij,nj->pni", pages, path)
-        found = np.full((len(pages), each, len(nominal.joints)), np.nan)
+        joints = np.full((len(pages), each, len(nominal.joints)), np.nan)
         for _ in range(_ROUNDS):
-            missing = np.flatnonzero(np.isnan(found[:, 0, 0]))
+            missing = np.flatnonzero(np.isnan(joints[:, 0, 0]))
             begun = np.tile(missing, 2 * _MOST_STARTS)
             facing = -pages[begun, :, 2]
             starts = places[begun, 0]
@@ -121,13 +121,13 @@ class PencilCircle(Device):
             pencil = np.array([nominal.world_poses(at)[1][:, :, 2] for at in q])
             whole &= (np.einsum("kni,ni->kn", pencil, facing) > np.cos(_LARGEST_LEAN)).all(axis=0)
             for k in np.flatnonzero(whole).tolist():
-                found[begun[k]] = q[::fine, k]
-            if np.isfinite(found).all():
-                return found
+                joints[begun[k]] = q[::fine, k]
+            if np.isfinite(joints).all():
+                return joints
         raise InputError(
             f"{nominal.name} cannot follow the whole circle",
             where=self.name,
-            came=f"{int(np.isfinite(found[:, 0, 0]).sum())} of {len(pages)} circles drawn",
+            came=f"{int(np.isfinite(joints[:, 0, 0]).sum())} of {len(pages)} circles drawn",
             cure="Take a smaller circle, pages that are less steep, or another device.",
         )
 

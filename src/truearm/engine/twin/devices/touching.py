@@ -154,8 +154,8 @@ class SmallVolume(Device):
         inside = rng.uniform(-0.45, 0.45, (len(of), 3)) * self.range
         name = nominal.targets[0].name
         goals = origins[of] + inside @ turned.T
-        kept, joints = postures_at(nominal, name, goals, count, rng, self.name)
-        of, inside, goals = of[kept], inside[kept], goals[kept]
+        reached, joints = postures_at(nominal, name, goals, count, rng, self.name)
+        of, inside, goals = of[reached], inside[reached], goals[reached]
         joints = jogged(nominal, arm, name, joints, lambda place: goals - place)
         return recorded(
             nominal,
@@ -224,13 +224,13 @@ class PlaneProbe(Device):
         name = nominal.targets[0].name
         goals = middle + np.einsum("nij,nj->ni", plates[of], places)
         facing = -plates[of, :, 2]
-        kept, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=facing)
+        reached, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=facing)
         if count >= _LEAST_ON_A_PLATE * len(plates):
-            for plate in np.flatnonzero(np.bincount(of[kept], minlength=len(plates)) < _LEAST_ON_A_PLATE).tolist():
+            for plate in np.flatnonzero(np.bincount(of[reached], minlength=len(plates)) < _LEAST_ON_A_PLATE).tolist():
                 on = np.flatnonzero(of == plate)
                 more, q = postures_at(nominal, name, goals[on], _LEAST_ON_A_PLATE, rng, self.name, facing=facing[on])
-                kept, joints = _with_these(kept, joints, on[more], q, of)
-        of, up = of[kept], -facing[kept]
+                reached, joints = _with_these(reached, joints, on[more], q, of)
+        of, up = of[reached], -facing[reached]
         miss = sigma * rng.standard_normal(count)
 
         def short(place: Array) -> Array:
@@ -251,15 +251,15 @@ class PlaneProbe(Device):
 
 
 def _with_these(
-    kept: NDArray[np.intp], joints: Array, added: NDArray[np.intp], q: Array, of: NDArray[np.intp]
+    reached: NDArray[np.intp], joints: Array, added: NDArray[np.intp], q: Array, of: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Array]:
     """Return as many contacts as before, those of one plate exchanged, and the last of the fullest plates given up."""
-    count, other = len(kept), of[kept] != of[added[0]]
-    kept, joints = kept[other], joints[other]
-    while len(kept) + len(added) > count:
-        last = np.flatnonzero(of[kept] == np.bincount(of[kept]).argmax())[-1]
-        kept, joints = np.delete(kept, last), np.delete(joints, last, axis=0)
-    together = np.concatenate([kept, added])
+    count, other = len(reached), of[reached] != of[added[0]]
+    reached, joints = reached[other], joints[other]
+    while len(reached) + len(added) > count:
+        last = np.flatnonzero(of[reached] == np.bincount(of[reached]).argmax())[-1]
+        reached, joints = np.delete(reached, last), np.delete(joints, last, axis=0)
+    together = np.concatenate([reached, added])
     order = np.argsort(together)
     return together[order], np.concatenate([joints, q])[order]
 
@@ -285,8 +285,8 @@ class SphereProbe(Device):
         name = nominal.targets[0].name
         goals = centres[of] + self.radius * normal
         wide = np.deg2rad(75.0)
-        kept, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=-normal, within=wide)
-        of = of[kept]
+        reached, joints = postures_at(nominal, name, goals, count, rng, self.name, facing=-normal, within=wide)
+        of = of[reached]
         miss = sigma * rng.standard_normal(count)
 
         def short(place: Array) -> Array:
@@ -351,8 +351,10 @@ class TwoSockets(Device):
         of = np.arange(SPARE * count) % len(centres)
         name = nominal.targets[0].name
         down = np.tile(-turned[:, 2], (len(of), 1))
-        kept, joints = postures_at(nominal, name, centres[of], count, rng, self.name, facing=down, within=self.within)
-        of = of[kept]
+        reached, joints = postures_at(
+            nominal, name, centres[of], count, rng, self.name, facing=down, within=self.within
+        )
+        of = of[reached]
         wanted = centres[of] + sigma * rng.standard_normal((count, 3))
         joints = jogged(nominal, arm, name, joints, lambda place: wanted - place)
         fixtures = ("socket_1", "socket_2")

@@ -49,7 +49,7 @@ HOLD_CONTRADICTS: Final = Rule(
 )
 
 
-def check_held(
+def check_fixed_places(
     robot: Robot,
     fit: Fit,
     data: Dataset,
@@ -66,11 +66,11 @@ def check_held(
         data: The training readings.
         loss, redundancy, bounds, bounds_file: Of the fit.
     """
-    if not fit.held:
+    if not fit.fixed:
         return []
     priors = redundancy == "prior"
     try:
-        found = identify(
+        freed = identify(
             robot,
             data,
             fit.model,
@@ -81,22 +81,22 @@ def check_held(
         )
     except InputError:  # nothing but the places held makes a fit possible
         return []
-    with_held, without = _left(errors_of(fit.robot, data)), _left(errors_of(found.robot, data))
-    added = max(len(found.free.names) - len(fit.free.names), 1)
-    apart = [words for words, size in _apart(fit, found) if size >= 1.0] if data.anchored and priors else []
-    unlikely = bool(apart) and chi_squared_tail(max(_rise(fit, found, data), 0.0), added) < _CHANCE
-    freedom = with_held[2] - len(found.free.names)
+    with_fixed, without = _left(errors_of(fit.robot, data)), _left(errors_of(freed.robot, data))
+    added = max(len(freed.free.names) - len(fit.free.names), 1)
+    apart = [words for words, size in _apart(fit, freed) if size >= 1.0] if data.anchored and priors else []
+    unlikely = bool(apart) and chi_squared_tail(max(_rise(fit, freed, data), 0.0), added) < _CHANCE
+    freedom = with_fixed[2] - len(freed.free.names)
     misfit = (
         freedom >= _LEAST_FREEDOM
-        and with_held[0] > max(_MORE * without[0], _NEGLIGIBLE)
-        and (with_held[0] ** 2 - without[0] ** 2) / added > _LEAST_F * without[0] ** 2 / freedom
+        and with_fixed[0] > max(_MORE * without[0], _NEGLIGIBLE)
+        and (with_fixed[0] ** 2 - without[0] ** 2) / added > _LEAST_F * without[0] ** 2 / freedom
     )
     if not misfit and not unlikely:
-        return _strained(fit, found) if priors else []
+        return _strained(fit, freed) if priors else []
     message = "The places that are held contradict the readings"
     if misfit:
         message += (
-            f": with them the fit leaves {with_held[0] * 1e3:.3g} mm of the training readings, with all of them found "
+            f": with them the fit leaves {with_fixed[0] * 1e3:.3g} mm of the training readings, with all of them found "
             f"{without[0] * 1e3:.3g} mm (root mean square)"
         )
     if apart and unlikely:
@@ -117,16 +117,16 @@ HOLD_STRAINED: Final = Rule(
 )
 
 
-def _strained(fit: Fit, found: Fit) -> list[Notice]:
+def _strained(fit: Fit, freed: Fit) -> list[Notice]:
     """Return a notice if parameters of the arm go far with the places held, and only then."""
 
-    def far(one: Fit, p: Parameter) -> float:
-        return (one.robot.values[p.name] - p.nominal) / p.prior
+    def far(fitted: Fit, p: Parameter) -> float:
+        return (fitted.robot.values[p.name] - p.nominal) / p.prior
 
     strained = [
         f"{p.name} ({far(fit, p):+.1f} times its prior)"
         for p in fit.free.parameters
-        if p.group not in PLACES and abs(far(fit, p)) > _STRAINED and abs(far(found, p)) < _AT_EASE
+        if p.group not in PLACES and abs(far(fit, p)) > _STRAINED and abs(far(freed, p)) < _AT_EASE
     ]
     if not strained:
         return []
@@ -149,11 +149,11 @@ def _left(errors: Errors) -> tuple[float, int, int]:
     return rms, len(every), 3 * len(positions) + len(lengths)
 
 
-def _rise(fit: Fit, found: Fit, data: Dataset) -> float:
+def _rise(fit: Fit, freed: Fit, data: Dataset) -> float:
     """Return by how much the squares of readings and priors rise with the places held, in units of what is left."""
-    with_held, without = _squares(fit, found.sigma, data), _squares(found, found.sigma, data)
-    left = without[0] / max(without[1] - len(found.free.names), 1)
-    return (sum(with_held[::2]) - sum(without[::2])) / max(left, 1.0)
+    with_fixed, without = _squares(fit, freed.sigma, data), _squares(freed, freed.sigma, data)
+    left = without[0] / max(without[1] - len(freed.free.names), 1)
+    return (sum(with_fixed[::2]) - sum(without[::2])) / max(left, 1.0)
 
 
 def _squares(fit: Fit, sigma: Mapping[str, float], data: Dataset) -> tuple[float, int, float]:
@@ -164,16 +164,16 @@ def _squares(fit: Fit, sigma: Mapping[str, float], data: Dataset) -> tuple[float
     return float(residual @ residual), len(residual), float(np.sum(np.square(moved)))
 
 
-def _apart(fit: Fit, found: Fit) -> Iterator[tuple[str, float]]:
+def _apart(fit: Fit, freed: Fit) -> Iterator[tuple[str, float]]:
     """Yield what is held: how far it is found from there, in words and by what is far."""
-    if fit.held.base is not None:
-        place = _place(found.robot, "base", found.robot.base_quaternion)
-        yield _difference("the base", place, fit.held.base, turned=True)
-    for target in found.robot.targets:
-        if target.name in fit.held.targets:
-            place = _place(found.robot, target.parameter("x")[:-2], target.quaternion)
-            held = fit.held.targets[target.name]
-            yield _difference(f"target {target.name}", place, held, turned=target.quaternion is not None)
+    if fit.fixed.base is not None:
+        place = _place(freed.robot, "base", freed.robot.base_quaternion)
+        yield _difference("the base", place, fit.fixed.base, turned=True)
+    for target in freed.robot.targets:
+        if target.name in fit.fixed.targets:
+            place = _place(freed.robot, target.parameter("x")[:-2], target.quaternion)
+            fixed = fit.fixed.targets[target.name]
+            yield _difference(f"target {target.name}", place, fixed, turned=target.quaternion is not None)
 
 
 def _place(robot: Robot, prefix: str, quaternion: tuple[float, float, float, float] | None) -> Transform:
@@ -185,12 +185,12 @@ def _place(robot: Robot, prefix: str, quaternion: tuple[float, float, float, flo
     return Transform.from_matrix(rotation_from_quaternion(np.array(quaternion)) @ rotation_from_vector(small), position)
 
 
-def _difference(what: str, place: Transform, held: Transform, *, turned: bool) -> tuple[str, float]:
+def _difference(name: str, place: Transform, fixed: Transform, *, turned: bool) -> tuple[str, float]:
     """Return how far a place is found from where it is held: in words, and in what counts as far."""
-    shift = float(np.linalg.norm(np.array(place.translation) - np.array(held.translation)))
-    words, size = f"{what} is {shift * 1e3:.3g} mm", shift / _APART[0]
+    shift = float(np.linalg.norm(np.array(place.translation) - np.array(fixed.translation)))
+    words, size = f"{name} is {shift * 1e3:.3g} mm", shift / _APART[0]
     if turned:
-        turn = float(np.linalg.norm(rotation_vector((held.rotation.T @ place.rotation)[None])[0]))
+        turn = float(np.linalg.norm(rotation_vector((fixed.rotation.T @ place.rotation)[None])[0]))
         words += f" and {math.degrees(turn):.2g} deg"
         size = max(size, turn / _APART[1])
     return words, size

@@ -20,7 +20,7 @@ from truearm.engine.robot.transform import Transform
 
 
 @dataclass(frozen=True)
-class Held:
+class FixedPlaces:
     """What is known of base, targets and fixtures, and held while the rest is found."""
 
     base: Transform | None = None  #: ``T_world_base``; None if it is found.
@@ -56,13 +56,13 @@ class Held:
         """Whether it says where the robot stands among what the readings see, where the readings do not."""
         return any(name in data.fixtures for name in self.fixtures)
 
-    def seen_from(self, fixture: str) -> Held:
+    def seen_from(self, fixture: str) -> FixedPlaces:
         """Return what is held, with the frame of a fixture as the world."""
         if self.base is None or fixture not in self.fixtures:
-            return Held(targets=self.targets)
+            return FixedPlaces(targets=self.targets)
         from_it = np.linalg.inv(self.fixtures[fixture].matrix) @ self.base.matrix
-        return Held(Transform.from_matrix(from_it[:3, :3], from_it[:3, 3]), self.targets)
+        return FixedPlaces(Transform.from_matrix(from_it[:3, :3], from_it[:3, 3]), self.targets)
 
 
 #: Base, targets and fixtures are all found.
-NOTHING_HELD: Final = Held()
+NOTHING_FIXED: Final = FixedPlaces()

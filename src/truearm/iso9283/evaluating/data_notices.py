@@ -39,7 +39,7 @@ DRIFT_TIME: Final = Rule(
 )
 
 
-def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tuple[Notice, ...]:
+def drift_notices(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tuple[Notice, ...]:
     """Return what is to be said of courses that are one group alone, or do not last as long as planned."""
     planned = 3600.0 * plan.hours
     single, other, timeless = [], [], False
@@ -56,23 +56,23 @@ def said_of_drift(plan: PerformancePlan, courses: Sequence[DriftCourse]) -> tupl
                 units = [unit for unit, seconds in _UNITS.items() if _fits(lasts * seconds, planned)]
                 asked = f" (are the times in {units[0]}?)" if units else ""
                 other.append(f"{name}: {len(course.cycles)} groups over {lasts / 3600.0:.3g} h{asked}")
-    made = []
+    notices = []
     if single:
-        made.append(
+        notices.append(
             SINGLE_DRIFT_GROUP(
                 f"All cycles of drift are one group at {'; '.join(single)}: there is no change to be told. A group "
                 "begins where the numbers of the cycles begin anew, or after a pause."
             )
         )
     if other or timeless:
-        told = "; ".join(other) or "the rows of dAP have no times"
-        made.append(
+        durations = "; ".join(other) or "the rows of dAP have no times"
+        notices.append(
             DRIFT_TIME(
-                f"Drift is planned over {plan.hours:g} h; measured: {told}. dAP and dRP tell the change over the time "
-                "that was measured, and are not those of the plan."
+                f"Drift is planned over {plan.hours:g} h; measured: {durations}. dAP and dRP tell the change over the "
+                "time that was measured, and are not those of the plan."
             )
         )
-    return tuple(made)
+    return tuple(notices)
 
 
 def _fits(lasts: float, planned: float) -> bool:
@@ -87,10 +87,10 @@ _ROUNDED: Final = 0.06
 _ABOVE_NOISE: Final = 6.0
 
 
-def said_of_pushes(plan: PerformancePlan, pushes: Sequence[PushLine], instrument: Instrument) -> tuple[Notice, ...]:
+def push_notices(plan: PerformancePlan, pushes: Sequence[PushLine], instrument: Instrument) -> tuple[Notice, ...]:
     """Return what is to be said of pushes: forces far below the rated ones, and directions that cannot be right."""
-    found = (_low(plan, pushes), _sideways(pushes, instrument))
-    return tuple(notice for notice in found if notice is not None)
+    notices = (_low(plan, pushes), _sideways(pushes, instrument))
+    return tuple(notice for notice in notices if notice is not None)
 
 
 LOW_FORCES: Final = Rule(
@@ -118,8 +118,8 @@ def _low(plan: PerformancePlan, pushes: Sequence[PushLine]) -> Notice | None:
         if kilograms
         else " Push up to the rated load, or check the unit."
     )
-    told = ", ".join(f"{name} {largest[name]:.4g} N" for name in low)
-    return LOW_FORCES(f"The largest forces are well below the weight of the rated load, {most:.4g} N: {told}.{asked}")
+    forces = ", ".join(f"{name} {largest[name]:.4g} N" for name in low)
+    return LOW_FORCES(f"The largest forces are well below the weight of the rated load, {most:.4g} N: {forces}.{asked}")
 
 
 SIDEWAYS_PUSH: Final = Rule(
@@ -148,17 +148,17 @@ def _sideways(pushes: Sequence[PushLine], instrument: Instrument) -> Notice | No
         least = float(np.linalg.eigvalsh((matrix + matrix.T) / 2)[0])
         if least > -_ABOVE_NOISE * max(error.values()):
             return None
-    told = []
+    directions = []
     for name in names:
         k = "xyz".index(name[1])
         along, across = float(abs(slope[name][k])), np.delete(slope[name], k)
         sideways = float(np.linalg.norm(across))
         if sideways - along > _ABOVE_NOISE * error[name]:
             most = [axis for axis in "xyz" if axis != name[1]][int(np.abs(across).argmax())]
-            told.append(f"{name} ({1e3 * sideways:.3g} mm/N, most along {most}; along it {1e3 * along:.3g})")
-    if not told:
+            directions.append(f"{name} ({1e3 * sideways:.3g} mm/N, most along {most}; along it {1e3 * along:.3g})")
+    if not directions:
         return None
-    return SIDEWAYS_PUSH(f"The tip moves more at right angles to the force than along it: {listed(told)}.")
+    return SIDEWAYS_PUSH(f"The tip moves more at right angles to the force than along it: {listed(directions)}.")
 
 
 def _standard_error(pushes: Sequence[PushLine], name: str, instrument: Instrument) -> float:
@@ -174,13 +174,13 @@ def _standard_error(pushes: Sequence[PushLine], name: str, instrument: Instrumen
 _NAMED = 4
 
 
-def said_of_rounding(found: Evaluation, instrument: Instrument) -> tuple[Notice, ...]:
+def rounding_notices(evaluation: Evaluation, instrument: Instrument) -> tuple[Notice, ...]:
     """Return what is to be said of rounding.
 
     Args:
         instrument: As stated, without what rounding adds.
     """
-    notices = (_readings(found, instrument), _times(found, instrument))
+    notices = (_readings(evaluation, instrument), _times(evaluation, instrument))
     return tuple(notice for notice in notices if notice is not None)
 
 
@@ -192,19 +192,19 @@ READINGS_ROUNDED: Final = Rule(
 )
 
 
-def _readings(found: Evaluation, instrument: Instrument) -> Notice | None:
-    told = []
-    for name, reading in found.readings.items():
+def _readings(evaluation: Evaluation, instrument: Instrument) -> Notice | None:
+    rounded = []
+    for name, reading in evaluation.readings.items():
         if reading.rounding > instrument.sigma:
             step = 1e3 * math.sqrt(12.0) * reading.rounding
-            told.append(f"positions of {name} to {step:.3g} mm ({1e3 * reading.rounding:.2g} mm)")
+            rounded.append(f"positions of {name} to {step:.3g} mm ({1e3 * reading.rounding:.2g} mm)")
         if instrument.sigma_rot is not None and reading.rounding_rot > instrument.sigma_rot:
             step = math.sqrt(3.0) * reading.rounding_rot
-            told.append(f"quaternions of {name} to {step:.2g} ({math.degrees(reading.rounding_rot):.2g} deg)")
-    if not told:
+            rounded.append(f"quaternions of {name} to {step:.2g} ({math.degrees(reading.rounding_rot):.2g} deg)")
+    if not rounded:
         return None
     return READINGS_ROUNDED(
-        f"Readings are rounded more coarsely than the instrument reads: {', '.join(told)}. What that leaves open "
+        f"Readings are rounded more coarsely than the instrument reads: {', '.join(rounded)}. What that leaves open "
         "as a standard deviation, in brackets, stands in place of the instrument's."
     )
 
@@ -218,29 +218,30 @@ TIMES_ROUNDED: Final = Rule(
 )
 
 
-def _times(found: Evaluation, instrument: Instrument) -> Notice | None:
-    told: dict[str, str] = {}
-    for of, clock, pace in _clocks(found):
+def _times(evaluation: Evaluation, instrument: Instrument) -> Notice | None:
+    rounded: dict[str, str] = {}
+    for of, clock, pace in _clocks(evaluation):
         off = pace * clock.resolution / math.sqrt(12.0)
-        if off > instrument.sigma and of not in told:
+        if off > instrument.sigma and of not in rounded:
             even = "on an even clock" if clock.even else "no even clock fits"
-            told[of] = f"{of} to {clock.resolution:g} s, {1e3 * pace * clock.resolution:.2g} mm ({even})"
-    if not told:
+            rounded[of] = f"{of} to {clock.resolution:g} s, {1e3 * pace * clock.resolution:.2g} mm ({even})"
+    if not rounded:
         return None
-    more = f", and {len(told) - _NAMED} more" if len(told) > _NAMED else ""
+    more = f", and {len(rounded) - _NAMED} more" if len(rounded) > _NAMED else ""
     return TIMES_ROUNDED(
-        f"Times are rounded to more than the tip is known to move in: {', '.join(list(told.values())[:_NAMED])}{more}."
+        f"Times are rounded to more than the tip is known to move in: "
+        f"{', '.join(list(rounded.values())[:_NAMED])}{more}."
     )
 
 
-def _clocks(found: Evaluation) -> Iterator[tuple[str, Clock, float]]:
+def _clocks(evaluation: Evaluation) -> Iterator[tuple[str, Clock, float]]:
     """Yield whose each clock is, and how fast the tip is there: at rest where it enters the band [m/s]."""
-    runs = [velocity.run for velocity in found.velocities] + [deviation.run for deviation in found.deviations]
-    runs += [corner.run for corner in found.corners] + [weave.run for weave in found.weaves]
+    runs = [velocity.run for velocity in evaluation.velocities] + [deviation.run for deviation in evaluation.deviations]
+    runs += [corner.run for corner in evaluation.corners] + [weave.run for weave in evaluation.weaves]
     for run in runs:
         for clock in {id(cycle.clock): cycle.clock for cycle in run.cycles}.values():
             yield f"{run.test} on {run.path.path.name}", clock, run.velocity
-    for curve in found.settling:
+    for curve in evaluation.settling:
         row = int(np.clip(np.searchsorted(curve.time, curve.entry), 1, len(curve.time) - 1))
         pace = abs(np.diff(curve.distance)[row - 1]) / max(curve.time[row] - curve.time[row - 1], 1e-9)
         yield f"{curve.test} at {curve.where}", curve.clock, float(pace)
@@ -272,30 +273,30 @@ class _Record:
     rounding: float
 
 
-def said_of_streams(found: Evaluation) -> tuple[Notice, ...]:
+def stream_notices(evaluation: Evaluation) -> tuple[Notice, ...]:
     """Return what is to be said of paths and settling."""
-    runs = _runs(found)
+    runs = _runs(evaluation)
     notices = (
-        _unusual(_records(found, runs)),
-        _outlying(found),
+        _unusual(_records(evaluation, runs)),
+        _outlying(evaluation),
         _gaps(runs),
         _slow(runs),
-        _sparse(found),
-        _bandwidth(found),
-        _aside(found),
+        _sparse(evaluation),
+        _bandwidth(evaluation),
+        _aside(evaluation),
     )
     return tuple(notice for notice in notices if notice is not None)
 
 
-def _runs(found: Evaluation) -> list[Run]:
-    runs = [curve.run for curve in found.deviations] + [curve.run for curve in found.corners]
-    runs += [curve.run for curve in found.velocities] + [curve.run for curve in found.weaves]
+def _runs(evaluation: Evaluation) -> list[Run]:
+    runs = [curve.run for curve in evaluation.deviations] + [curve.run for curve in evaluation.corners]
+    runs += [curve.run for curve in evaluation.velocities] + [curve.run for curve in evaluation.weaves]
     return list({id(run): run for run in runs}.values())
 
 
-def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
+def _records(evaluation: Evaluation, runs: Sequence[Run]) -> list[_Record]:
     of_paths, of_settling = (
-        found.readings[name].rounding if name in found.readings else 0.0 for name in ("paths", "settling")
+        evaluation.readings[name].rounding if name in evaluation.readings else 0.0 for name in ("paths", "settling")
     )
     records = []
     for run in runs:
@@ -307,10 +308,10 @@ def _records(found: Evaluation, runs: Sequence[Run]) -> list[_Record]:
         places = tuple(c.along for c in cycles)
         records.append(_Record(_called(run), numbers, lines, times, positions, places, of_paths))
     settling: dict[tuple[object, ...], list[int]] = {}
-    for row, curve in enumerate(found.settling):
+    for row, curve in enumerate(evaluation.settling):
         settling.setdefault((curve.test, curve.where, curve.conditions), []).append(row)
     for rows in settling.values():
-        curves = [found.settling[row] for row in rows]
+        curves = [evaluation.settling[row] for row in rows]
         # half of the way is passed at one time in each cycle: the clocks are set by it
         half = [float(c.time[int((c.distance < 0.5 * c.distance[0]).argmax())]) for c in curves]
         records.append(
@@ -377,17 +378,17 @@ SLOW_PATH: Final = Rule(
 
 
 def _slow(runs: Sequence[Run]) -> Notice | None:
-    told = []
+    slow_paths = []
     for run in runs:
         pace = float(np.median([pace_along(run.path, cycle.time, cycle.along) for cycle in run.cycles]))
         if pace < _SLOW[run.path.path.kind] * run.velocity:
-            told.append(f"{_called(run)} at {1e3 * pace:.4g} of {1e3 * run.velocity:.4g} mm/s")
-    if not told:
+            slow_paths.append(f"{_called(run)} at {1e3 * pace:.4g} of {1e3 * run.velocity:.4g} mm/s")
+    if not slow_paths:
         return None
-    more = f", and {len(told) - _NAMED_PATHS} more" if len(told) > _NAMED_PATHS else ""
+    more = f", and {len(slow_paths) - _NAMED_PATHS} more" if len(slow_paths) > _NAMED_PATHS else ""
     return SLOW_PATH(
-        f"Paths were run much slower than commanded: {', '.join(told[:_NAMED_PATHS])}{more}. If the robot cannot, that "
-        "is what AV says; otherwise check velocity [%] and the rated velocity of the plan."
+        f"Paths were run much slower than commanded: {', '.join(slow_paths[:_NAMED_PATHS])}{more}. If the robot cannot,"
+        " that is what AV says; otherwise check velocity [%] and the rated velocity of the plan."
     )
 
 
@@ -396,20 +397,20 @@ SAMPLED_TOO_SLOWLY: Final = Rule(
 )
 
 
-def _sparse(found: Evaluation) -> Notice | None:
-    told: dict[str, None] = {}
-    for path in found.deviations:
+def _sparse(evaluation: Evaluation) -> Notice | None:
+    criteria: dict[str, None] = {}
+    for path in evaluation.deviations:
         if path.sparse:
-            told |= dict.fromkeys((path.run.test, path.run.test.replace("AT", "RT", 1)))
-    for corner in found.corners:
-        told |= dict.fromkeys(id_ for id_, far in zip(("CR", "CO"), corner.sparse, strict=True) if far)
-    for curve in found.settling:
+            criteria |= dict.fromkeys((path.run.test, path.run.test.replace("AT", "RT", 1)))
+    for corner in evaluation.corners:
+        criteria |= dict.fromkeys(id_ for id_, far in zip(("CR", "CO"), corner.sparse, strict=True) if far)
+    for curve in evaluation.settling:
         ids = ("t", "OV") if curve.test == "t" else ("posing-time",)
-        told |= dict.fromkeys(id_ for id_, far in zip(ids, curve.sparse, strict=False) if far)
-    if not told:
+        criteria |= dict.fromkeys(id_ for id_, far in zip(ids, curve.sparse, strict=False) if far)
+    if not criteria:
         return None
     return SAMPLED_TOO_SLOWLY(
-        f"Samples are too far apart for some values of {listed(tuple(told))}: what lies between two of them is not "
+        f"Samples are too far apart for some values of {listed(tuple(criteria))}: what lies between two of them is not "
         "seen. Those values are marked; sample faster."
     )
 
@@ -424,17 +425,17 @@ OUTLYING_CYCLE: Final = Rule(
 )
 
 
-def _outlying(found: Evaluation) -> Notice | None:
+def _outlying(evaluation: Evaluation) -> Notice | None:
     named = []
-    for path in found.deviations:
+    for path in evaluation.deviations:
         outlying = outlying_cycle(path)
         if outlying is None:
             continue
         cycle, far, accuracy, repeatability = outlying
-        now = f"RT is {1e3 * float(path.spread.max()):.4f} mm, without it {1e3 * repeatability:.4f}"
-        now += f"; AT is {1e3 * float(path.distance.max()):.4f} mm, without it {1e3 * accuracy:.4f}"
+        values = f"RT is {1e3 * float(path.spread.max()):.4f} mm, without it {1e3 * repeatability:.4f}"
+        values += f"; AT is {1e3 * float(path.distance.max()):.4f} mm, without it {1e3 * accuracy:.4f}"
         number = path.run.cycles[cycle].number
-        named.append((far, f"cycle {number} of {_called(path.run)} by {1e3 * far:.4f} mm ({now})"))
+        named.append((far, f"cycle {number} of {_called(path.run)} by {1e3 * far:.4f} mm ({values})"))
     if not named:
         return None
     return OUTLYING_CYCLE(
@@ -481,8 +482,8 @@ VELOCITY_BANDWIDTH: Final = Rule(
 )
 
 
-def _bandwidth(found: Evaluation) -> Notice | None:
-    bandwidths = [curve.bandwidth for curve in found.velocities]
+def _bandwidth(evaluation: Evaluation) -> Notice | None:
+    bandwidths = [curve.bandwidth for curve in evaluation.velocities]
     if not bandwidths:
         return None
     low, high = min(bandwidths), max(bandwidths)
@@ -500,14 +501,14 @@ CORNER_OFFSET: Final = Rule(
 )
 
 
-def _aside(found: Evaluation) -> Notice | None:
-    there = [corner for corner in found.corners if corner.offset > _ASIDE * float(corner.rounding.mean())]
-    if not there:
+def _aside(evaluation: Evaluation) -> Notice | None:
+    offset_corners = [corner for corner in evaluation.corners if corner.offset > _ASIDE * float(corner.rounding.mean())]
+    if not offset_corners:
         return None
-    worst = max(there, key=lambda corner: corner.offset)
+    worst = max(offset_corners, key=lambda corner: corner.offset)
     return CORNER_OFFSET(
-        f"At {len(there)} of {len(found.corners)} corners the path as a whole lies beside its command by more than "
-        f"half of CR, which CR and CO contain. At {worst.where} it lies {1e3 * worst.offset:.3f} mm beside, and CR of "
-        f"{1e3 * float(worst.rounding.mean()):.3f} mm would be {1e3 * float(worst.own.mean()):.3f} mm from its own "
-        "corner."
+        f"At {len(offset_corners)} of {len(evaluation.corners)} corners the path as a whole lies beside its command by "
+        f"more than half of CR, which CR and CO contain. At {worst.where} it lies {1e3 * worst.offset:.3f} mm beside, "
+        f"and CR of {1e3 * float(worst.rounding.mean()):.3f} mm would be "
+        f"{1e3 * float(worst.own.mean()):.3f} mm from its own corner."
     )

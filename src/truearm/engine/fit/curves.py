@@ -508,6 +508,16 @@ class Curves:
         """Names of all coefficients."""
         return tuple(self.places)
 
+    def known_of(self, free: FreeParameters) -> FreeParameters:
+        """Return free parameters without the coefficients that were not found, the others as large as was found."""
+        return FreeParameters(
+            tuple(
+                replace(p, prior=math.sqrt(self.variances[p.name])) if p.name in self.variances else p
+                for p in free.parameters
+                if p.name not in self.places or p.name in self.variances
+            )
+        )
+
     def priors_of(self, robot: Robot) -> list[Parameter]:
         """Return a robot's coefficients with what is expected of them."""
         return [replace(robot.parameters[name], prior=math.sqrt(variance)) for name, variance in self.variances.items()]

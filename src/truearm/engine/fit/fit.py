@@ -270,7 +270,7 @@ def identify(
         small=small,
     )
     draws = refit_draws(solved, loss, bootstrap, seed, progress) if bootstrap else None
-    return _fit(solved, model, loss, draws)
+    return fit_of(solved, model, loss, draws)
 
 
 def place(robot: Robot, data: Dataset, loss: Loss = "linear", fixed: FixedPlaces = NOTHING_FIXED) -> Robot:
@@ -285,7 +285,12 @@ def place(robot: Robot, data: Dataset, loss: Loss = "linear", fixed: FixedPlaces
     return find_parameters(robot, data, FRAMES, loss=loss, fixed=fixed, shared=False).robot
 
 
-def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -> Fit:
+def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -> Fit:
+    """Return a fit from its solution: what the values that were found are worth.
+
+    Args:
+        draws: Values of the free parameters from data that were drawn anew, ``(draws, parameters)``.
+    """
     problem, solution, start, limits = solved.problem, solved.solution, solved.start, solved.limits
     free, x = problem.free, solution.vector
     at_bound = bound_by(solution, free, limits)

@@ -186,7 +186,9 @@ def test_json_holds_what_is_known_of_every_parameter() -> None:
     assert model["payload"] == {"mass": 2.7, "cog": [0.05, 0.025, 0.1]}
     assert model["gravity"] == [0.5, -0.3, -9.7]
     assert model["joints"][0]["limits"] == list(robot.joints[0].limits or ())
-    assert model["joints"][0]["transmission_periods"] == robot.joints[0].transmission_periods
+    assert [joint["transmission_periods"] for joint in model["joints"]] == [240, 240, 200, 100, 100, 100]
+    several = exported(with_lines(robot, {2: (), 3: (200, 400, 101)}), "json").text
+    assert [joint["transmission_periods"] for joint in json.loads(several)["joints"][1:3]] == [None, [200, 400, 101]]
 
 
 def test_json_holds_curves_as_arrays() -> None:
@@ -216,6 +218,22 @@ def test_json_holds_curves_as_arrays() -> None:
 def rigid_with_curves(robot: Robot) -> Robot:
     """The arm without weight: nothing but curves moves its joints."""
     return replace(robot, masses=(), payload=Payload(0.0))
+
+
+def with_lines(robot: Robot, lines: Mapping[int, tuple[int, ...]]) -> Robot:
+    """The same robot with other numbers of periods of some gears; joints count from 1."""
+    joints = (replace(j, transmission_periods=lines.get(i, j.periods)) for i, j in enumerate(robot.joints, 1))
+    return replace(robot, joints=tuple(joints))
+
+
+def test_gears_that_err_at_several_numbers_are_in_the_python_file() -> None:
+    robot = calibrated(with_lines(load_robot("irb120"), {2: (), 3: (200, 400, 101), 4: (100, 300)}), FULL)
+    made = module(robot)
+    assert [[line[0] for line in gear] for gear in made["TRANSMISSION"]] == [
+        *([240], [], [200, 400, 101], [100, 300], [100], [100]),
+    ]
+    check_poses(made["forward"](configurations(robot)), robot, configurations(robot))
+    assert module(calibrated(load_robot("irb120"), ELASTIC))["TRANSMISSION"] == ((),) * 6  # known, but no part of it
 
 
 def test_curves_are_arrays_of_the_python_file() -> None:

@@ -33,6 +33,7 @@ from truearm.engine.robot.effects.balancing import Balancing
 from truearm.engine.robot.effects.effect import Effect
 from truearm.engine.robot.effects.joint_curve import JointCurve, curve_names
 from truearm.engine.robot.effects.linear_contact import LinearContactClearance
+from truearm.engine.robot.effects.transmission import transmission_names
 from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY
@@ -107,7 +108,7 @@ def model_json(robot: Robot, frames: str, left_out: Iterable[str]) -> str:
                 "name": joint.name,
                 "kind": joint.kind,
                 "limits": None if joint.limits is None else list(joint.limits),
-                "transmission_periods": joint.transmission_periods,
+                "transmission_periods": joint.periods_entry,
                 "bearing": joint.bearing,
                 "max_speed": joint.max_speed,
                 "elements": _elements(robot, link),
@@ -245,9 +246,12 @@ def _constants(robot: Robot) -> dict[str, str]:
         return tuple(values.get(f"{family}_{i}", nothing) for i in numbers)
 
     series = zip(*(by_joint(f"fourier_{part}") for part in ("sin1", "cos1", "sin2", "cos2")), strict=True)
-    gear = zip(*(by_joint(f"transmission_{part}") for part in ("sin", "cos")), strict=True)
-    periods = [
-        (joint.transmission_periods or 0) if f"transmission_sin_{i}" in values else 0
+    gears = [
+        tuple(
+            (k, values[sine], values[cosine])
+            for k, sine, cosine in transmission_names(joint.periods, i)
+            if sine in values
+        )
         for i, joint in enumerate(robot.joints, 1)
     ]
     places, masses, balancers = _bodies(robot)
@@ -265,7 +269,7 @@ def _constants(robot: Robot) -> dict[str, str]:
         "PAYLOAD": repr((robot.payload.mass, robot.payload.cog)),
         "GAIN": _rows(by_joint("gain", 1.0), names),
         "FOURIER": _rows(list(series), names),
-        "TRANSMISSION": _rows([(n, *parts) for n, parts in zip(periods, gear, strict=True)], names),
+        "TRANSMISSION": _rows(gears, names),
         "CURVES": _series([_curve(robot, i) for i in numbers], names),
         "COMPLIANCE": _rows(by_joint("compliance"), names),
         "COMPLIANCE_QUADRATIC": _rows(by_joint("compliance_quadratic"), names),

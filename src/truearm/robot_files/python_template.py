@@ -39,10 +39,10 @@ BALANCERS: tuple[
     tuple[tuple[int, tuple[float, float, float]], tuple[int, tuple[float, float, float]], float, float, float], ...
 ] = ()
 #: Joint effects, one entry a joint. By joint positions: how far a joint turns per unit read; its Fourier series (sine
-#: and cosine of the reading, then of twice the reading); the error of its gear (periods in a turn, sine, cosine).
+#: and cosine of the reading, then of twice the reading); the errors of its gear (periods in a turn, sine, cosine).
 GAIN: tuple[float, ...] = (1.0,) * 2
 FOURIER: tuple[tuple[float, float, float, float], ...] = ((0.0, 0.0, 0.0, 0.0),) * 2
-TRANSMISSION: tuple[tuple[int, float, float], ...] = ((0, 0.0, 0.0),) * 2
+TRANSMISSION: tuple[tuple[tuple[int, float, float], ...], ...] = ((),) * 2
 #: The curve of each joint over a turn: sine and cosine of the reading, of twice the reading, and so on; empty for none.
 CURVES: tuple[tuple[float, ...], ...] = ((),) * 2
 #: By the moment M of weights about the axis (for a sliding joint the force along it): c1 M, c2 M |M|, c3 M^3; the play.
@@ -187,9 +187,10 @@ def _bent(q: Array) -> tuple[Array, Array]:
 def _by_position(q: Array) -> Array:
     """Return what is added to the joint positions, whatever the load."""
     s1, c1, s2, c2 = np.array(FOURIER).T
-    periods, s, c = np.array(TRANSMISSION).T
     series = s1 * np.sin(q) + c1 * np.cos(q) + s2 * np.sin(2 * q) + c2 * np.cos(2 * q)
-    series += s * np.sin(periods * q) + c * np.cos(periods * q)
+    for i, gear in enumerate(TRANSMISSION):
+        for periods, s, c in gear:
+            series[:, i] += s * np.sin(periods * q[:, i]) + c * np.cos(periods * q[:, i])
     for i, curve in enumerate(CURVES):
         angles = q[:, i, None] * np.arange(1, len(curve) // 2 + 1)
         series[:, i] += np.sin(angles) @ np.array(curve[0::2]) + np.cos(angles) @ np.array(curve[1::2])

@@ -55,6 +55,51 @@ def test_what_is_no_error_of_a_gear_or_said_already_is_left_in_peace() -> None:
     assert periodic_errors(*few) == ()
 
 
+def test_several_lines_of_a_gear_are_found_and_nothing_else() -> None:
+    for seed in range(3):
+        check_four_lines(seed)
+
+
+@pytest.mark.slow
+def test_lines_are_found_in_many_campaigns_and_none_where_there_are_none() -> None:
+    for seed in range(3, 20):
+        check_four_lines(seed)
+    for seed in range(50):
+        assert periodic_errors(*campaign(unknown_gears(load_robot("irb120")), {}, 150, seed), most=9) == (), seed
+
+
+#: The stronger of each joint first, and amplitudes [rad].
+LINES = {3: (400, 200), 4: (100, 300)}
+SIZES = (2e-4, 1.5e-4)
+
+
+def check_four_lines(seed: int) -> None:
+    """Look for lines in two joints whose gears err at two numbers of periods each."""
+    plain, rng = unknown_gears(load_robot("irb120")), np.random.default_rng(seed)
+    twin = truth_twin(plain, "random", rng)
+    gears = {joint: tuple(zip(periods, SIZES, (0.7, 2.0), strict=True)) for joint, periods in LINES.items()}
+    erring = {joint: JointTruth(gear=gear) for joint, gear in gears.items()}
+    data = measure(replace(twin, joints=erring), plain.random_configurations(200, rng), 3e-5, rng)
+    fit = identify(plain.with_payload(twin.robot.payload), data, ELASTIC)
+    found = periodic_errors(fit, data, most=9)
+    assert [(e.joint, e.periods) for e in found] == [(joint, n) for joint in LINES for n in LINES[joint]], seed
+    assert [error.amplitude for error in found] == pytest.approx([*SIZES, *SIZES], rel=0.35), seed
+    assert [(e.joint, e.periods) for e in periodic_errors(fit, data)] == [(3, 400), (4, 100)], seed
+
+    # A line that the robot knows is not told again, nor its neighbours, though the model leaves it in the residuals.
+    robot = with_gears(fit.robot, {3: 400, 4: 300})
+    assert periodic_errors(replace(fit, robot=robot), data) == ()
+    further = periodic_errors(replace(fit, robot=robot), data, most=9)
+    assert [(error.joint, error.periods) for error in further] == [(3, 200), (4, 100)], seed
+    beside = with_gears(fit.robot, {3: (398, 200), 4: (101, 300)})
+    assert periodic_errors(replace(fit, robot=beside), data, most=9) == (), seed
+
+
+def with_gears(robot: Robot, periods: dict[int, int | tuple[int, ...]]) -> Robot:
+    joints = (replace(j, transmission_periods=periods.get(i, j.periods)) for i, j in enumerate(robot.joints, 1))
+    return replace(robot, joints=tuple(joints))
+
+
 def test_the_effect_takes_the_error_out() -> None:
     robot = load_robot("irb120")
     fit, data = campaign(robot, {3: (200, 2e-4)}, 80, 3)

@@ -75,6 +75,20 @@ def test_library_robot_goes_into_any_convention_and_calibrated_where_tilts_have_
             assert all(p.value == p.nominal for p in converted_robot.parameters.values())
 
 
+def test_gears_keep_every_number_of_periods_in_any_convention() -> None:
+    plain, rng = load_robot("irb120"), np.random.default_rng(4)
+    many = ((240, 30), (), (200, 400, 101), (100, 300), (100,), ())
+    joints = tuple(replace(j, transmission_periods=periods) for j, periods in zip(plain.joints, many, strict=True))
+    geared = replace(plain, joints=joints).with_effects(["transmission-error"])
+    own = [p.name for p in geared.effects[0].parameters]
+    robot = geared.with_values({name: 1e-4 * n for n, name in enumerate(own, 1)})
+    for name in CONVERSIONS:
+        made = converted(robot, name)
+        assert tuple(joint.periods for joint in made.joints) == many
+        assert {name: made.values[name] for name in own} == {name: robot.values[name] for name in own}
+        check_same(made, robot, rng)
+
+
 @pytest.mark.parametrize("robot_id", ["irb120", "katana450", "kr5", "ur5"])  # one of each build
 def test_library_robot_goes_from_any_convention_to_any(robot_id: str) -> None:
     rng = np.random.default_rng(0)

@@ -91,6 +91,32 @@ def test_effects_are_those_of_the_twin(effects: tuple[str, ...]) -> None:
     assert np.abs(position - plain).max() > 1e-6
 
 
+def with_many_lines(robot: Robot) -> Robot:
+    """The same robot with gears that err at several numbers of periods, or at none that is known."""
+    many = ((240, 30), (), (200, 400, 101), (100, 300), (100,), ())
+    joints = (replace(j, transmission_periods=periods) for j, periods in zip(robot.joints, many, strict=True))
+    return replace(robot, joints=tuple(joints))
+
+
+def test_gears_that_err_at_several_numbers_of_periods_are_those_of_the_twin() -> None:
+    geared = with_many_lines(loaded_arm((), 1)).with_effects(("transmission-error",))
+    names = [p.name for p in geared.effects[0].parameters]
+    assert names[:4] == ["transmission_sin_1", "transmission_cos_1", "transmission_sin30_1", "transmission_cos30_1"]
+    assert len(names) == 2 * 8
+    drawn = {name: 1e-4 * n for n, name in enumerate(names, 1)}
+    q = geared.random_configurations(20, np.random.default_rng(3))
+    for values in (*({name: value} for name, value in drawn.items()), drawn):
+        robot = geared.with_values(values)
+        true = np.array([posture.targets["tip"] for posture in Twin(robot, joint_truths(robot)).postures(q)])
+        position, rotation = robot.world_poses(q, "tip")
+        assert_allclose(position, true[:, :3, 3], rtol=0, atol=1e-11)
+        assert_allclose(rotation, true[:, :3, :3], rtol=0, atol=1e-11)
+    turned = geared.effects[0].deflection(Postures(q), {**geared.values, "transmission_cos101_3": 2e-4})
+    assert_allclose(turned[2], 2e-4 * np.cos(101 * q[:, 2]), rtol=0, atol=1e-15)
+    assert not turned[0].any()
+    assert set(turned) == {0, 2, 3, 4}
+
+
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_derivatives_are_central_differences_under_load(effect: type[Effect]) -> None:
     robot = loaded_arm((effect.name,), 3)

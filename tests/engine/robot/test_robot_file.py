@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,9 +95,13 @@ CHANGES: list[tuple[str, str, list[str]]] = [
     (COG, f"{COG}, inertia: [1e99, 1e99, 1e99, 0, 0, 0]", ["masses[1].inertia", "too large"]),
     (COG, f"{COG}, inertia: [1, 1, .nan, 0, 0, 0]", ["masses[1].inertia", "finite"]),
     (COG, f"{COG}, inertia: [1, 1, 1]", ["masses[1].inertia", "too few entries"]),
-    (LIMITS, f"{LIMITS}, transmission_periods: [40]", ["joints[1].transmission_periods", "a whole number belongs"]),
-    (LIMITS, f"{LIMITS}, transmission_periods: 0", ["joints[1].transmission_periods", "allowed: 1 or more"]),
-    (LIMITS, f"{LIMITS}, transmission_periods: 20000", ["joints[1].transmission_periods", "allowed: 10000 or less"]),
+    *(
+        (LIMITS, f"{LIMITS}, transmission_periods: {n}", ["joints[1].transmission_periods", f"number once; got {n}"])
+        for n in (0, 20_000, 40.5, "'40'", "true", "[[100]]")
+    ),
+    (LIMITS, f"{LIMITS}, transmission_periods: [100, 300, 100]", ["each number once; got 100; allowed: a whole"]),
+    (LIMITS, f"{LIMITS}, transmission_periods: [100, -3]", ["got -3; allowed: a whole number from 1 to 10000, or a"]),
+    (LIMITS, f"{LIMITS}, transmission_periods: {[*range(1, 22)]}", ["got 21; allowed", "list of up to 20 different"]),
     (LIMITS, f"{LIMITS}, max_speed: 4.36", ["joints[1].max_speed", "10 to 10000 deg/s"]),
     (LIMITS, f"{LIMITS}, max_speed: 0", ["joints[1].max_speed", "take the entry out"]),
     (LIMITS, f"{LIMITS}, max_speed: -250", ["joints[1].max_speed", "got '-250 deg/s'"]),
@@ -324,6 +329,36 @@ def test_what_was_identified_may_be_negative(tmp_path: Path) -> None:
     entry = "compliance_2: {nominal: -0.1, value: -0.2, prior: 1, unit: mrad/(N m)}"
     robot = read(tmp_path, f"{PLAIN}effects: [compliance]\nparameters: {{{entry}}}\nhistory: [calibrated twice]\n")
     assert robot.values["compliance_2"] == pytest.approx(-0.2e-3)
+
+
+def test_a_gear_errs_at_one_number_of_periods_or_at_several(tmp_path: Path) -> None:
+    for entry, periods in (("100", (100,)), ("[100]", (100,)), ("[100, 300]", (100, 300)), ("[]", ()), ("null", ())):
+        text = changed(LIMITS, f"{LIMITS}, transmission_periods: {entry}") + "effects: [transmission-error]\n"
+        robot = read(tmp_path, text)
+        assert robot.joints[0].periods == robot.joints[0].transmission_periods == periods
+        assert robot.layout.transmission_periods == (periods, (), ())
+        names = [p.name for effect in robot.effects for p in effect.parameters]
+        further = ["transmission_sin300_1", "transmission_cos300_1"]
+        assert names == ["transmission_sin_1", "transmission_cos_1", *further][: 2 * len(periods)]
+        again = robot_text(robot.with_values({name: 1e-4 * n for n, name in enumerate(names, 1)}))
+        one = f"transmission_periods: {periods[0] if len(periods) == 1 else list(periods)}"
+        assert (one in again) == bool(periods)
+        assert robot_text(read(tmp_path, again)) == again
+    # The first number keeps the names that files with one have.
+    known = "parameters: {transmission_cos_1: {nominal: 0, value: 0.01, prior: 0.1, unit: deg}}\n"
+    assert read(tmp_path, text.replace("null", "100") + known).values["transmission_cos_1"] == math.radians(0.01)
+    assert read(tmp_path, text.replace("null", "[100, 9]") + known).values["transmission_cos_1"] == math.radians(0.01)
+
+
+def test_numbers_of_periods_are_refused_in_python_as_in_files() -> None:
+    joint = load_robot("irb120").joints[3]
+    known: tuple[Any, ...] = (None, 100, np.int64(100), (100, 300))
+    assert [replace(joint, transmission_periods=n).periods for n in known] == [(), (100,), (100,), (100, 300)]
+    assert replace(joint, transmission_periods=[100, 300]) == replace(joint, transmission_periods=(100, 300))
+    wrong: tuple[Any, ...] = (0, 10_001, 10**5000, True, "100", 1.5, (100, 100), [300, None], tuple(range(1, 22)))
+    for periods in wrong:
+        with refused("each number once", "from 1 to 10000", parameter="transmission_periods"):
+            replace(joint, transmission_periods=periods)
 
 
 def test_urdf_like_robot_round_trips(tmp_path: Path) -> None:

@@ -33,6 +33,8 @@ from truearm.engine.robot.robot import Robot
 AUTO: Final = "auto"
 #: Effects that are left to those who ask for them: forms of others.
 _ASKED_FOR: Final = frozenset({LinearContactClearance.name})
+#: Numbers of periods that a joint may have.
+_LINES: Final = 8
 #: Fits at most, each with the periodic errors that the one before left.
 _FITS: Final = 3
 #: What an effect moves the targets by, a root mean square, from which it is counted [m].
@@ -147,7 +149,7 @@ def identify_every_effect(
             seed=seed,
             progress=progress,
         )
-        more = periodic_errors(fit, data)
+        more = periodic_errors(fit, data, most=_LINES)
         if not more:
             break
         robot, lines = with_lines(robot, more), (*lines, *more)
@@ -155,13 +157,12 @@ def identify_every_effect(
 
 
 def with_lines(robot: Robot, lines: Sequence[PeriodicError]) -> Robot:
-    """Return a robot whose gears err as often in a turn as was found."""
-    periods = {line.joint: line.periods for line in lines}
+    """Return a robot whose gears also err as often in a turn as was found."""
     joints = tuple(
-        replace(joint, transmission_periods=periods.get(number, joint.transmission_periods))
+        replace(joint, transmission_periods=(*joint.periods, *(n.periods for n in lines if n.joint == number)))
         for number, joint in enumerate(robot.joints, 1)
     )
-    return replace(robot, joints=joints) if periods else robot
+    return replace(robot, joints=joints) if lines else robot
 
 
 def _shares(robot: Robot, fit: Fit, data: Dataset, lines: tuple[PeriodicError, ...]) -> Shares:

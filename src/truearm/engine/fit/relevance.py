@@ -210,14 +210,14 @@ def expected_sizes(sizes: Sizes, of: CurveMoments, curves: Array, names: Sequenc
         height = 0.5 * (larger * pull / (1.0 + larger * told) - np.log1p(larger * told)).sum(axis=1)
         height += np.log(_believed(tried, scale))
         likely = np.exp(height - height.max())
-        expected[mine] = float(likely @ larger[:, 0] / likely.sum())
+        expected[mine] = float(likely @ (tried / now) / likely.sum()) ** 2
     return expected
 
 
 def variances_beforehand(sizes: Sizes, names: Sequence[str]) -> Array:
     """Return what the variance of each parameter is expected to be without readings, by its prior's, ``(names,)``."""
     tried = _tried(1.0)
-    of_group = [float(tried**2 @ (believed := _believed(tried, scale)) / believed.sum()) for scale in sizes.scale]
+    of_group = [float(tried @ (believed := _believed(tried, scale)) / believed.sum()) ** 2 for scale in sizes.scale]
     return np.array([of_group[sizes.place[name]] if name in sizes.place else 1.0 for name in names])
 
 

@@ -2,13 +2,15 @@
 
 The residuals of each joint are held against sines of its positions, one number of periods in a turn after the other: a
 periodogram on readings at uneven places (Lomb 1976, "Least-squares frequency analysis of unequally spaced data"). The
-strongest is taken out before the next one is looked for. A sine is looked for only where the readings could tell one of
-the size that gears have: a joint that hardly turns, or whose axis passes the only target, says nothing.
+strongest is taken out before the next one is looked for, and all that were found are fitted anew with it (Pati,
+Rezaiifar and Krishnaprasad 1993, "Orthogonal matching pursuit"). A sine is looked for only where the readings could
+tell one of the size that gears have: a joint that hardly turns, or whose axis passes the only target, says nothing.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -73,12 +75,13 @@ class Pulls:
     free: int  #: Equations beyond the parameters: targets of a configuration share its errors, and count as one.
 
 
-def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
-    """Return the periodic errors of joints whose gear the robot file does not describe, one a joint at most.
+def periodic_errors(fit: Fit, data: Dataset, most: int = 1) -> tuple[PeriodicError, ...]:
+    """Return the periodic errors of joints that the robot file does not describe.
 
     Args:
         fit: What is left over is seen from it.
         data: The readings it is held against; fewer than 60 configurations say nothing.
+        most: How many a joint may have, see :func:`lines_of`.
     """
     robot = fit.robot
     if data.configurations < LEAST_CONFIGURATIONS or not data.has_position.any():
@@ -99,27 +102,33 @@ def periodic_errors(fit: Fit, data: Dataset) -> tuple[PeriodicError, ...]:
         np.add.at(left, configuration, (residual**2).sum(0))
         np.add.at(readings, configuration, 1.0)
     free = 3 * int((readings > 0).sum()) - len(fit.free.names)
-    return lines_of(robot, Pulls(at.joints, pull, weight, float(left.sum()), free))
+    return lines_of(robot, Pulls(at.joints, pull, weight, float(left.sum()), free), most=most)
 
 
-def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[PeriodicError, ...]:
-    """Return the periodic errors of a robot's joints whose gear it does not know, one a joint at most.
+def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST, most: int = 1) -> tuple[PeriodicError, ...]:
+    """Return the periodic errors of a robot's joints that it does not know, the strongest of a joint first.
 
     Fewer than 60 configurations say nothing.
 
     Args:
         fewest: Periods in a turn that are looked for, at least.
+        most: How many a joint may have, those that the robot knows included: with 1, joints whose gear it knows are
+            left alone. Of a joint that may have more, those that it knows are taken out of the pulls, and others are
+            looked for where its range tells them from these.
     """
     if len(pulls.joints) < LEAST_CONFIGURATIONS:
         return ()
-    q, pull, weight, total, free = pulls.joints, pulls.pull.copy(), pulls.weight, pulls.total, pulls.free
-    open_joints = [
-        i for i, joint in enumerate(robot.joints) if joint.kind == "revolute" and joint.transmission_periods is None
-    ]
+    q, weight = pulls.joints, pulls.weight
+    taken = {
+        i: list(joint.periods)
+        for i, joint in enumerate(robot.joints)
+        if joint.kind == "revolute" and len(joint.periods) < most
+    }
     errors: list[PeriodicError] = []
-    while open_joints:
+    while open_joints := [i for i, periods in taken.items() if len(periods) < most]:
+        pull, total, free = _left(pulls, taken)
         noise = total / max(free, 1)
-        tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise, fewest), i) for i in open_joints]
+        tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise, fewest, taken[i]), i) for i in open_joints]
         explained, periods, a, b, joint = max(tried)
         agreement = min(free * explained / total, _agreement(periods * q[:, joint], pull[:, joint]))
         chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * agreement)
@@ -128,13 +137,33 @@ def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST) -> tuple[Periodic
         wave = a * np.sin(periods * q[:, joint]) + b * np.cos(periods * q[:, joint])
         aliases = _aliases(q[:, joint], wave, weight[:, joint, joint], periods)
         errors.append(PeriodicError(joint + 1, periods, math.hypot(a, b), explained / total, chance, aliases))
-        pull -= weight[:, :, joint] * wave[:, None]
-        total -= explained
-        open_joints.remove(joint)
+        taken[joint].append(periods)
     return tuple(sorted(errors, key=lambda error: error.joint))
 
 
-def _strongest(q: Array, pull: Array, weight: Array, noise: float, fewest: int) -> tuple[float, int, float, float]:
+def _left(pulls: Pulls, taken: Mapping[int, Sequence[int]]) -> tuple[Array, float, int]:
+    """Return what the best sines of some numbers of periods leave of pulls, of the sum and of the equations.
+
+    Args:
+        taken: Numbers of periods by joint, from 0.
+    """
+    lines = [(i, k) for i, periods in taken.items() for k in periods]
+    if not lines:
+        return pulls.pull, pulls.total, pulls.free
+    joint = np.repeat([i for i, _ in lines], 2)
+    angles = np.stack([k * pulls.joints[:, i] for i, k in lines])
+    waves = np.stack([np.sin(angles), np.cos(angles)], axis=1).reshape(2 * len(lines), -1)
+    seen = np.einsum("an,bn,nab->ab", waves, waves, pulls.weight[:, joint[:, None], joint])
+    told = np.einsum("an,na->a", waves, pulls.pull[:, joint])
+    amounts = np.linalg.lstsq(seen, told, rcond=1e-10)[0]
+    pull = pulls.pull - np.einsum("a,an,nja->nj", amounts, waves, pulls.weight[:, :, joint])
+    left = max(pulls.total - float(amounts @ told), 1e-9 * pulls.total)  # rounding must not make it negative
+    return pull, left, pulls.free - len(waves)
+
+
+def _strongest(
+    q: Array, pull: Array, weight: Array, noise: float, fewest: int, taken: Sequence[int]
+) -> tuple[float, int, float, float]:
     """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad].
 
     It explains nothing where the readings see none.
@@ -144,14 +173,22 @@ def _strongest(q: Array, pull: Array, weight: Array, noise: float, fewest: int) 
         pull, weight: J'r [m^2] and J'J [m^2] of the joint, ``(n,)``.
         noise: Variance of a coordinate of the residuals [m^2].
         fewest: Periods in a turn that are looked for, at least.
+        taken: Numbers of periods that are taken out, whose neighbours say nothing new.
     """
     among = _PERIODS[fewest - FEWEST :]
     explained, a, b, least = _sines(q, pull, weight, among)
     passed = among * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
     seen = (least * _LARGEST_DEVIATION**2 > noise) & (passed > _LEAST_PERIODS)
+    for periods in taken:
+        seen &= np.abs(among - periods) > _near(q)
     explained = np.where(seen, explained, 0.0)
     best = int(np.argmax(explained))
     return float(explained[best]), int(among[best]), float(a[best]), float(b[best])
+
+
+def _near(q: Array) -> int:
+    """Return how far apart numbers of periods are, at most, that the range of a joint ``(n,)`` [rad] does not tell."""
+    return math.ceil(2.0 * math.pi / max(float(np.ptp(q)), 1e-3))
 
 
 def _sines(q: Array, pull: Array, weight: Array, periods: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
@@ -178,8 +215,7 @@ def _aliases(q: Array, wave: Array, weight: Array, periods: int) -> tuple[int, .
         periods: In a turn; its neighbours, which the range of the joint does not tell from it, are not others.
     """
     explained = _sines(q, weight * wave, weight, _ALIASES)[0] / float(weight @ wave**2)
-    near = math.ceil(2.0 * math.pi / max(float(np.ptp(q)), 1e-3))
-    places = np.flatnonzero((explained >= _SAME_WAVE) & (np.abs(_ALIASES - periods) > near))
+    places = np.flatnonzero((explained >= _SAME_WAVE) & (np.abs(_ALIASES - periods) > _near(q)))
     likest = np.argsort(-explained[places].round(6), kind="stable")  # of those that are the same the fewest periods
     return tuple(_ALIASES[places[likest][:_MOST_ALIASES]].tolist())
 

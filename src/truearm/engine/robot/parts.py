@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Integral
 from typing import Final, Literal
 
 from truearm.engine.base.arrays import finite_number, number_array
@@ -27,6 +28,31 @@ JOINT_SPEEDS: Final[Mapping[JointKind, tuple[float, float]]] = {
     "revolute": (math.radians(10.0), math.radians(10_000.0)),
     "prismatic": (0.01, 20.0),
 }
+#: How often a gear errs in a turn of its joint: at least, at most, and so many different numbers a joint.
+_FEWEST_PERIODS, _MOST_PERIODS, _MOST_LINES = 1, 10_000, 20
+
+
+def gear_periods(given: object) -> tuple[int, ...]:
+    """Return how often a gear errs in a turn: of None nothing, of a whole number that one, of a list all of them.
+
+    Raises
+    ------
+    InputError
+        If there are others than whole numbers from 1 to 10 000, one of them twice, or more than 20.
+    """
+    periods: list[int] = []
+    for n in [] if given is None else given if isinstance(given, list | tuple) else [given]:
+        whole = int(n) if isinstance(n, Integral) and not isinstance(n, bool) else 0
+        if not _FEWEST_PERIODS <= whole <= _MOST_PERIODS or whole in periods or len(periods) == _MOST_LINES:
+            raise InputError(
+                "how often a gear errs in a turn belongs here, each number once",
+                parameter="transmission_periods",
+                came=n if isinstance(n, str | int | float) else None,
+                allowed=f"a whole number from {_FEWEST_PERIODS} to {_MOST_PERIODS}, or a list of up to {_MOST_LINES} "
+                "different ones",
+            )
+        periods.append(whole)
+    return tuple(periods)
 
 
 @dataclass(frozen=True)
@@ -38,13 +64,27 @@ class Joint:
     row: Mapping[str, float]  #: Nominal value of each column of the convention [m and rad].
     limits: tuple[float, float] | None = None  #: Lowest and highest joint position [rad or m], where known.
     #: How often the joint's gear errs in a turn of the joint, where known: for a strain wave gear twice the turns of
-    #: its wave generator.
-    transmission_periods: int | None = None
+    #: its wave generator. A gear that errs at several numbers has several. Kept as a tuple, see :attr:`periods`.
+    transmission_periods: int | Sequence[int] | None = None
     #: How far along the joint's axis its bearing lies [m], from the joint's origin at nominal values (the origin of the
     #: frame right behind the joint's turn); None if that is not known, and zero is assumed. Joints that slide have
     #: none.
     bearing: float | None = None
     max_speed: float | None = None  #: How fast it goes at 100 % [rad/s or m/s], where known.
+
+    def __post_init__(self) -> None:
+        """Refuse numbers of periods that no gear has; keep them as a tuple, whatever was given."""
+        object.__setattr__(self, "transmission_periods", gear_periods(self.transmission_periods))
+
+    @property
+    def periods(self) -> tuple[int, ...]:
+        """Each number of times that its gear errs in a turn, as they were given; empty where none is known."""
+        return gear_periods(self.transmission_periods)
+
+    @property
+    def periods_entry(self) -> int | list[int] | None:
+        """What a file says of :attr:`periods`: one number, a list of several, None where none is known."""
+        return self.periods[0] if len(self.periods) == 1 else list(self.periods) or None
 
     @property
     def range(self) -> tuple[float, float]:

@@ -212,7 +212,7 @@ class RobotData:
         return Layout(
             tuple(joint.kind for joint in self.joints),
             tuple(lengths),
-            tuple(joint.transmission_periods for joint in self.joints),
+            tuple(joint.periods for joint in self.joints),
             len(self.balancers),
         )
 

@@ -120,9 +120,10 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
     def sines(number: int) -> tuple[tuple[int, float, float], ...]:
         parts = ((k, of(f"fourier_sin{k}", number), of(f"fourier_cos{k}", number)) for k in HARMONICS)
         curve = ((k, of(f"curve_sin{k}", number), of(f"curve_cos{k}", number)) for k in range(1, HIGHEST + 1))
-        periods = robot.joints[number - 1].transmission_periods
-        gear = (periods or 0, of("transmission_sin", number), of("transmission_cos", number))
-        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, *curve, gear) if s or c)
+        first, *further = robot.joints[number - 1].periods or (0,)
+        gear = (first, of("transmission_sin", number), of("transmission_cos", number))
+        lines = ((k, of(f"transmission_sin{k}", number), of(f"transmission_cos{k}", number)) for k in further)
+        return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, *curve, gear, *lines) if s or c)
 
     truths = {
         number: JointTruth(

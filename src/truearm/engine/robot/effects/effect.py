@@ -26,8 +26,8 @@ class Layout:
     kinds: tuple[JointKind, ...]  #: Kind of each joint; variable i moves joint i, from 0.
     #: Joint (from 0) and nominal value [m] of each slide of fixed length along the links.
     lengths: tuple[tuple[int, float], ...] = ()
-    #: How often each joint's gear errs in a turn, None where that is not known; may be left out.
-    transmission_periods: tuple[int | None, ...] = ()
+    #: How often each joint's gear errs in a turn, each with no number, one or several; may be left out.
+    transmission_periods: tuple[tuple[int, ...], ...] = ()
     balancers: int = 0  #: How many springs and gas cylinders relieve the joints.
 
     @property

@@ -6,11 +6,11 @@ import math
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, StringConstraints
 
 from truearm.engine.base.errors import InputError, did_you_mean, is_one_line
 from truearm.engine.robot.effects import EFFECTS
-from truearm.engine.robot.parts import GRAVITY, POINT_MASS, FixtureKind, Inertia
+from truearm.engine.robot.parts import GRAVITY, POINT_MASS, FixtureKind, Inertia, gear_periods
 from truearm.engine.robot.robot_file.curve_entry import CurveEntry
 from truearm.engine.robot.robot_file.entries import (
     STRICT,
@@ -85,7 +85,7 @@ class JointEntry(BaseModel):
     name: Name | None = None
     type: Literal["revolute", "prismatic"] = "revolute"
     limits: tuple[Number, Number] | None = None
-    transmission_periods: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = None
+    transmission_periods: Annotated[tuple[int, ...], PlainValidator(gear_periods)] = ()
     bearing: Number | None = None
     max_speed: Number | None = None
 

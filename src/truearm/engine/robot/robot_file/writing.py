@@ -219,8 +219,9 @@ def _joint(robot: Robot, j: Joint) -> CommentedMap:
     row |= {name: _listed([entries.pop(f"{name}_{a}") for a in "xyz"]) for name in vectors} | entries
     if j.limits:
         row["limits"] = _listed([written(v, unit) for v in j.limits])
-    if j.transmission_periods:
-        row["transmission_periods"] = j.transmission_periods
+    if j.periods:
+        periods = j.periods_entry
+        row["transmission_periods"] = _listed(periods) if isinstance(periods, list) else periods
     if j.bearing is not None:
         row["bearing"] = written(j.bearing, "mm")
     if j.max_speed is not None:

@@ -347,7 +347,7 @@ def test_periods_that_nobody_gave_are_found_and_taken_out() -> None:
     data = geared((200, 2e-4, 0.7), unknown.random_configurations(90, rng), rng)
     robot, fit, shares = identify_every_effect(unknown, data)
     assert [(line.joint, line.periods, line.aliases) for line in shares.lines] == [(3, 200, ())]
-    assert [joint.transmission_periods for joint in robot.joints] == [None, None, 200, None, None, None]
+    assert [joint.periods for joint in robot.joints] == [(), (), (200,), (), (), ()]
     sine, cosine = (fit.robot.values[f"transmission_{part}_3"] for part in ("sin", "cos"))
     assert np.hypot(sine, cosine) == pytest.approx(2e-4, rel=0.1)
     notice = found_in(shares, "periods-found")

@@ -127,10 +127,10 @@ def test_of_a_group_that_the_data_do_not_show_is_expected_what_was_believed() ->
 
 
 def test_what_is_believed_is_the_mean_of_a_half_cauchy_distribution_that_ends() -> None:
-    """The mean of s^2 over a density 1 / (1 + (s/c)^2) from 0 to 1 is c (1 - c atan(1/c)) / atan(1/c)."""
+    """The mean of s over a density 1 / (1 + (s/c)^2) from 0 to 1 is c log(1 + 1/c^2) / (2 atan(1/c))."""
     sizes = two_groups()
     found = dict(zip(NAMES, variances_beforehand(sizes, NAMES).tolist(), strict=True))
     for name, c in (("a1", 0.3), ("b1", 0.02)):
-        whole = np.arctan(1.0 / c)
-        assert found[name] == pytest.approx(c * (1.0 - c * whole) / whole, rel=0.25)  # of a few levels
+        mean = c * np.log1p(1.0 / c**2) / (2.0 * np.arctan(1.0 / c))
+        assert np.sqrt(found[name]) == pytest.approx(mean, rel=0.2)  # of a few levels
     assert expected_sizes(NO_SIZES, equations(np.eye(6), np.ones(6)), np.zeros(0), NAMES).tolist() == [1.0] * 6

@@ -1,4 +1,4 @@
-"""What `auto` finds, how well that predicts, and how long it takes: the measured IRB 120 and UR5, over ten seeds.
+"""What `auto` finds, how well that predicts, and how long it takes: twins, and the measured IRB 120 and UR5.
 
 The time is that of the model with every effect, over that of one elastic fit to the same data, in one process.
 Argument: seeds (10). Writes benchmarks/every_effect.json. The measured data are found at TRUEARM_DATA.
@@ -25,6 +25,9 @@ from truearm.engine.fit.models import named_model
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.engine.twin.twin_joint import JointTruth
 from truearm.importing.files import read_matrices
 
 DATA = Path(os.environ.get("TRUEARM_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -43,6 +46,15 @@ def ur5(name: str) -> Dataset:
     rows = np.genfromtxt(DATA / "ur5-tracker" / f"{name}.csv", delimiter=",", skip_header=1)
     reached = 1e-3 * (rows[:, 1:4] + rows[:, 4:7])
     return Dataset.of(np.radians(rows[:, 7:13]), reached, order=np.arange(len(rows)))
+
+
+def twin(backlash: float, *, one_target: bool) -> Dataset:
+    """Return readings of a twin of the IRB 120 whose joints bend, and have backlash [rad] at joints 2 and 3."""
+    robot, rng = load_robot("irb120").with_payload(PAYLOAD), np.random.default_rng(0)
+    soft = {2: JointTruth(3e-5, backlash=backlash), 3: JointTruth(1.3e-4, backlash=backlash), 5: JointTruth(4e-4)}
+    true = replace(truth_twin(robot, "random", rng), joints=soft)
+    data = measure(true, robot.random_configurations(400, rng), 2e-5, rng)
+    return replace(data.of_readings(data.target == 0), targets=data.targets[:1]) if one_target else data
 
 
 def mean_mm(robot: Robot, data: Dataset) -> float:
@@ -88,7 +100,13 @@ def main() -> None:
     seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     robot, arm = load_robot("irb120").with_payload(PAYLOAD), load_robot("ur5")
     unknown = replace(robot, joints=tuple(replace(joint, transmission_periods=None) for joint in robot.joints))
-    cases = {
+    twins = {
+        f"twin that {what}, {count}, {targets}": (robot, twin(play, one_target=targets == "one target"), count, None)
+        for what, play in (("bends", 0.0), ("bends and has backlash", 3e-4))
+        for count, targets in ((12, "one target"), (20, "one target"), (20, "three targets"), (30, "one target"))
+    }
+    cases: dict[str, tuple[Robot, Dataset, int, Dataset | None]] = {
+        **twins,
         "IRB 120, 20": (robot, irb120(), 20, None),
         "IRB 120, 30": (robot, irb120(), 30, None),
         "UR5, 20 of the grid": (arm, ur5("grid"), 20, None),

@@ -97,7 +97,10 @@ def test_the_order_of_groups_and_parameters_makes_no_difference() -> None:
 
 def two_groups() -> Sizes:
     """Return groups of three and of two parameters."""
-    groups = {("a", "rad", "1"): ("a1", "a2", "a3"), ("b", "rad", ""): ("b1", "b2")}
+    groups: dict[tuple[str, ...], tuple[str, ...]] = {
+        ("a", "rad", "1"): ("a1", "a2", "a3"),
+        ("b", "rad", ""): ("b1", "b2"),
+    }
     return Sizes(groups, deviation=np.array([0.2, 0.01]), scale=np.array([0.3, 0.02]), known=np.array([3.0, 0.0]))
 
 

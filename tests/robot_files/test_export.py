@@ -34,7 +34,8 @@ ELASTIC = ("compliance",)
 FULL = ("gain", "fourier", "transmission-error", "compliance", "hardening", "backlash")
 TILTING = ("compliance", "bearing-compliance", "clearance")
 CURVED = ("joint-curve", "compliance")
-EFFECTS = [(), ELASTIC, FULL, TILTING, CURVED]
+BENT = ("compliance", "link-bending", "run-out")
+EFFECTS = [(), ELASTIC, FULL, TILTING, CURVED, BENT]
 #: What parameters of a real robot are away from nominal, by group: each a standard deviation in SI units.
 AWAY = {
     "base": 0.1,
@@ -51,6 +52,8 @@ AWAY = {
     "bearing-compliance": 5e-6,
     "clearance": 2e-4,
     "clearance-linear-contact": 2e-4,
+    "link-bending": 5e-5,
+    "run-out": 2e-5,
     "approach": 2e-4,
 }
 
@@ -271,14 +274,14 @@ def module(robot: Robot) -> dict[str, Any]:
     return space
 
 
-@pytest.mark.parametrize("effects", EFFECTS, ids=["geometric", "elastic", "full", "tilting", "curved"])
+@pytest.mark.parametrize("effects", EFFECTS, ids=["geometric", "elastic", "full", "tilting", "curved", "bent"])
 @pytest.mark.parametrize("robot_id", ARMS)
 def test_the_python_file_gives_the_poses(robot_id: str, effects: tuple[str, ...]) -> None:
     robot = calibrated(load_robot(robot_id), effects)
     check_poses(module(robot)["forward"](q := configurations(robot)), robot, q)
 
 
-@pytest.mark.parametrize("effects", [("gain", "compliance"), ("clearance-linear-contact", "backlash")])
+@pytest.mark.parametrize("effects", [("gain", "compliance"), ("clearance-linear-contact", "backlash"), BENT])
 @pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda c: c.name)
 def test_the_python_file_of_any_convention(convention: Convention, effects: tuple[str, ...]) -> None:
     robot = random_robot(convention, (), np.random.default_rng(4))
@@ -289,7 +292,7 @@ def test_the_python_file_of_any_convention(convention: Convention, effects: tupl
     check_poses(module(robot)["forward"](q), robot, q)
 
 
-@pytest.mark.parametrize("effects", EFFECTS, ids=["geometric", "elastic", "full", "tilting", "curved"])
+@pytest.mark.parametrize("effects", EFFECTS, ids=["geometric", "elastic", "full", "tilting", "curved", "bent"])
 @pytest.mark.parametrize("robot_id", ["irb120", "ur10", "katana450", "li3"])
 def test_forward_of_inverse(robot_id: str, effects: tuple[str, ...]) -> None:
     robot = calibrated(load_robot(robot_id), effects)

@@ -33,6 +33,8 @@ from truearm.engine.robot.effects.balancing import Balancing
 from truearm.engine.robot.effects.effect import Effect
 from truearm.engine.robot.effects.joint_curve import JointCurve, curve_names
 from truearm.engine.robot.effects.linear_contact import LinearContactClearance
+from truearm.engine.robot.effects.link_bending import bending_names
+from truearm.engine.robot.effects.run_out import run_out_names
 from truearm.engine.robot.effects.transmission import transmission_names
 from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.robot import Robot
@@ -277,6 +279,8 @@ def _constants(robot: Robot) -> dict[str, str]:
         "BACKLASH": _rows(by_joint("backlash"), names),
         "BEARING_COMPLIANCE": _rows(by_joint("bearing_compliance"), names),
         "CLEARANCE": _rows(by_joint("clearance"), names),
+        "BENDING": _rows([_bending(values, i) for i in numbers], names),
+        "RUN_OUT": _rows([_run_out(robot, values, i) for i in numbers], names),
         "LINEAR_CONTACT": repr(any(isinstance(effect, LinearContactClearance) for effect in effects)),
         "READINGS": _rows(_tuples(q)),
         "POSITIONS": _rows(_tuples(position)),
@@ -314,6 +318,21 @@ def _bodies(robot: Robot) -> tuple[list[tuple[Row, Row]], list[tuple[int, float,
         ends = tuple((end.link, seen(end.link, end.point)) for end in (b.fixed, b.moving))
         balancers.append((*ends, factor * b.force, b.length, factor * b.stiffness))
     return places, masses, balancers
+
+
+def _bending(values: Mapping[str, float], number: int) -> tuple[Row, ...]:
+    """Return what gravity's direction does behind a joint, empty where it does nothing."""
+    found = np.array([values.get(name, 0.0) for name in bending_names(number)])
+    return _tuples(found.reshape(3, 3)) if found.any() else ()
+
+
+def _run_out(robot: Robot, values: Mapping[str, float], number: int) -> tuple[Row, ...]:
+    """Return sine and cosine of a joint's run-out along the axes of its place, which has its zero; empty for none."""
+    found = np.array([values.get(name, 0.0) for name in run_out_names(number)]).reshape(3, 2)
+    moving = next(element for element in robot.link_elements[number - 1] if element.variable is not None)
+    zero = moving.value if moving.parameter is None else robot.values[moving.parameter]
+    c, s = np.cos(zero), np.sin(zero)
+    return _tuples(np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ found) if found.any() else ()
 
 
 def _curve(robot: Robot, number: int) -> Row:

@@ -53,6 +53,11 @@ BACKLASH: tuple[float, ...] = (0.0,) * 2
 #: By the moments across the axis, tilts of the joint: per moment, and to the end of a clearance.
 BEARING_COMPLIANCE: tuple[float, ...] = (0.0,) * 2
 CLEARANCE: tuple[float, ...] = (0.0,) * 2
+#: By the direction in which gravity falls, in the joint's frame behind its turn: turns about x, y and z for each of its
+#: components; empty for none.
+BENDING: tuple[tuple[tuple[float, float, float], ...], ...] = ((),) * 2
+#: By the joint position, slides along x, y and z of the joint's frame before its turn: sine and cosine; empty for none.
+RUN_OUT: tuple[tuple[tuple[float, float], ...], ...] = ((),) * 2
 #: Whether the contact angle of clearances is taken as linear in the moments.
 LINEAR_CONTACT: bool = False
 
@@ -71,8 +76,7 @@ def forward(q: ArrayLike) -> tuple[Array, Array]:
 
     `q` are joint positions ``(n, joints)`` [rad, m]. The arm is at rest and bends under its weight.
     """
-    turned, tilted = _bent(_checked(q, (None, len(JOINTS)), "readings"))
-    return _frames(turned, tilted)[2]
+    return _frames(*_bent(_checked(q, (None, len(JOINTS)), "readings")))[2]
 
 
 def inverse(position: ArrayLike, rotation: ArrayLike, seed: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -105,7 +109,7 @@ def inverse(position: ArrayLike, rotation: ArrayLike, seed: ArrayLike) -> tuple[
 
 
 def _frames(
-    turned: Array, tilted: Array
+    turned: Array, tilted: Array, aside: Array
 ) -> tuple[list[tuple[Array, Array]], list[tuple[Array, Array]], tuple[Array, Array]]:
     """Return position and rotation of every joint's frame, of the frame behind it, and of the flange."""
     p, R = np.zeros((len(turned), 3)), np.broadcast_to(np.eye(3), (len(turned), 3, 3))
@@ -117,9 +121,10 @@ def _frames(
         if SLIDING[i]:
             p = p + R[:, :, 2] * turned[:, i, None]
         else:
+            p = p + (R @ aside[:, i, :, None])[:, :, 0]
             R = R @ _rotation(2, turned[:, i])
         joints.append((p, R))
-        if BEARING_COMPLIANCE[i] or CLEARANCE[i]:
+        if BEARING_COMPLIANCE[i] or CLEARANCE[i] or BENDING[i]:
             R = R @ _rotation(0, tilted[:, i, 0]) @ _rotation(1, tilted[:, i, 1])
         links.append((p, R))
     return joints, links, (p, R)
@@ -135,9 +140,12 @@ def _rotation(axis: int, angle: float | Array) -> Array:
     return R
 
 
-def _loads(turned: Array, tilted: Array) -> tuple[Array, Array]:
-    """Return force and moment of weights and balancers beyond each joint, in its own frame, ``(n, joints, 3)``."""
-    joints, links, flange = _frames(turned, tilted)
+def _loads(turned: Array, tilted: Array, aside: Array) -> tuple[Array, Array, Array]:
+    """Return force and moment of weights and balancers beyond each joint, in its own frame, ``(n, joints, 3)``.
+
+    With them the direction in which gravity falls.
+    """
+    joints, links, flange = _frames(turned, tilted, aside)
     bodies = [(joint, mass, links[joint], cog) for joint, mass, cog in MASSES]
     bodies.append((len(JOINTS) - 1, PAYLOAD[0], flange, PAYLOAD[1]))
     force, moment = np.zeros((2, len(turned), len(JOINTS), 3))
@@ -155,22 +163,29 @@ def _loads(turned: Array, tilted: Array) -> tuple[Array, Array]:
         for i, (p, R) in enumerate(joints[lower:upper], lower):
             force[:, i] += (drawn[:, None, :] @ R)[:, 0]
             moment[:, i] += (np.cross(moved - p, drawn)[:, None, :] @ R)[:, 0]
-    return force, moment
+    down = np.array(GRAVITY) / (np.linalg.norm(GRAVITY) or 1.0)
+    return force, moment, np.stack([down @ R for _, R in joints], axis=1)
 
 
 # -- joint effects
 
 
-def _bent(q: Array) -> tuple[Array, Array]:
-    """Return how far the joints turn ``(n, joints)`` and tilt ``(n, joints, 2)``, in equilibrium with their loads."""
+def _bent(q: Array) -> tuple[Array, Array, Array]:
+    """Return how far the joints turn ``(n, joints)``, tilt ``(n, joints, 2)`` and move aside ``(n, joints, 3)``.
+
+    They are in equilibrium with their loads.
+    """
     count = len(JOINTS)
-    driven = q + _by_position(q)
+    driven, aside = q + _by_position(q), np.zeros((*q.shape, 3))
+    for i, waves in enumerate(RUN_OUT):
+        for axis, (s, c) in enumerate(waves):
+            aside[:, i, axis] = s * np.sin(q[:, i]) + c * np.cos(q[:, i])
     by_load = (COMPLIANCE, COMPLIANCE_QUADRATIC, COMPLIANCE_CUBIC, BACKLASH, BEARING_COMPLIANCE, CLEARANCE)
-    if not np.any(by_load):
-        return driven, np.zeros((*q.shape, 2))
+    if not np.any(by_load) and not any(BENDING):
+        return driven, np.zeros((*q.shape, 2)), aside
 
     def following(rows: NDArray[np.intp], now: Array) -> Array:
-        turned, tilted = _by_load(*_loads(now[:, :count], now[:, count:].reshape(len(now), count, 2)))
+        turned, tilted = _by_load(*_loads(now[:, :count], now[:, count:].reshape(len(now), count, 2), aside[rows]))
         return np.concatenate([driven[rows] + turned, tilted.reshape(len(rows), 2 * count)], axis=1)
 
     left = np.arange(len(q))
@@ -181,7 +196,7 @@ def _bent(q: Array) -> tuple[Array, Array]:
         left = left[np.abs(way).max(axis=1, initial=0.0) > 1e-12]
         if not len(left):
             break
-    return now[:, :count], now[:, count:].reshape(len(now), count, 2)
+    return now[:, :count], now[:, count:].reshape(len(now), count, 2), aside
 
 
 def _by_position(q: Array) -> Array:
@@ -197,7 +212,7 @@ def _by_position(q: Array) -> Array:
     return np.asarray((np.array(GAIN) - 1.0) * q + series)
 
 
-def _by_load(force: Array, moment: Array) -> tuple[Array, Array]:
+def _by_load(force: Array, moment: Array, fall: Array) -> tuple[Array, Array]:
     """Return by how far the joints turn, or slide, and tilt under their loads."""
     m = np.where(SLIDING, force[:, :, 2], moment[:, :, 2])
     turned = np.array(COMPLIANCE) * m + np.array(COMPLIANCE_QUADRATIC) * m * np.abs(m)
@@ -211,7 +226,13 @@ def _by_load(force: Array, moment: Array) -> tuple[Array, Array]:
     else:
         side = moment[:, :, :2] / np.where(across > 0.0, across, 1.0)[:, :, None]
     slope = np.tan(CLEARANCE)[:, None] * np.tanh(across / 0.01)[:, :, None] * side
-    return turned, np.array(BEARING_COMPLIANCE)[:, None] * moment[:, :, :2] + slope / np.sqrt(1.0 + slope**2)
+    tilted = np.array(BEARING_COMPLIANCE)[:, None] * moment[:, :, :2] + slope / np.sqrt(1.0 + slope**2)
+    for i, rows in enumerate(BENDING):
+        if rows:
+            bent = fall[:, i] @ np.array(rows).T
+            tilted[:, i] += bent[:, :2]
+            turned[:, i] += bent[:, 2]
+    return turned, tilted
 
 
 # -- steps of the inverse
@@ -243,8 +264,7 @@ def _solved(position: Array, rotation: Array, start: Array) -> Array:
 
 def _missing(q: Array, position: Array, rotation: Array) -> tuple[Array, Array]:
     """Return what is missing in position and orientation ``(n, 6)``, and how the rigid arm follows its joints."""
-    turned, tilted = _bent(q)
-    joints, _, (p, R) = _frames(turned, tilted)
+    joints, _, (p, R) = _frames(*_bent(q))
     jacobian = np.zeros((len(q), 6, len(JOINTS)))
     for i, (origin, axes) in enumerate(joints):
         if SLIDING[i]:

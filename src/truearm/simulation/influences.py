@@ -285,7 +285,7 @@ def least_squares(robot: Robot, data: Dataset, names: Sequence[str], target: str
     poses = _poses(robot, data, names, target, TOLERANCE, dict.fromkeys(names, 1.0))
     centres = [p.restarted(p.value) for p in (robot.parameters[name] for name in names)]
     fitted = robot
-    for _ in range(_LOADINGS if any(effect.loaded for effect in robot.effects) else 1):
+    for _ in range(_LOADINGS if robot.bends else 1):
         free = FreeParameters(tuple(replace(p, value=fitted.values[p.name]) for p in centres))
         vector = solve(Problem(fitted, poses.data, free, {"position": TOLERANCE})).vector
         fitted = robot.with_values(dict(zip(names, vector, strict=True)))

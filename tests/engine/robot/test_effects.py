@@ -240,7 +240,7 @@ def test_tilts_under_their_own_loads_are_those_of_the_variables() -> None:
 def test_variables_of_another_number_are_refused() -> None:
     robot = load_robot("irb120").with_effects(["bearing-compliance"])
     for variables in (np.zeros((6, 5)), np.zeros(23)):
-        with refusing("wrong number of variables", "allowed: (23, n)"):
+        with refusing("wrong number of variables", "allowed: (18, n)"):
             robot.joints_of(variables)
 
 
@@ -269,6 +269,9 @@ def test_it_depends_on_moves_and_is_called_what_it_says(effect: type[Effect]) ->
     assert matters(wrench=2.0 * at.wrench) == effect.loaded
     assert matters(approach=-at.approach, number=at.number[::-1]) == effect.ordered
     assert matters(temperature=at.temperature + 5.0) == effect.warmed
+    fallen = replace(robot, gravity=(9.8, 0.0, 0.0))
+    leans = np.abs(fallen.world_poses(at)[0] - robot.world_poses(at)[0]).max() > 1e-9
+    assert leans == (effect.loaded or effect.falls)
 
     rates = robot.effects[0].derivative(robot.loaded(at), robot.values).values()
     moved = {variable for rate in rates for variable in rate}
@@ -276,8 +279,11 @@ def test_it_depends_on_moves_and_is_called_what_it_says(effect: type[Effect]) ->
     tilts = {variable for joint in layout.joints for variable in layout.tilt(joint)}
     lengths = {layout.length(number) for number in range(len(layout.lengths))}
     assert bool(moved & tilts) == effect.tilts
+    shifts = {variable for joint in layout.joints for variable in layout.shift(joint)}
     assert bool(moved & lengths) == effect.stretches
-    assert bool(moved & set(layout.joints)) == (not effect.tilts and not effect.stretches)
+    assert bool(moved & shifts) == effect.shifts
+    beside = effect.tilts or effect.stretches or effect.shifts
+    assert bool(moved & set(layout.joints)) == (not beside or effect.falls)
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)

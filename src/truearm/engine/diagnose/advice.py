@@ -250,7 +250,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         )
     if fit.model.weighed:  # what the data do not tell has shrunk, and its uncertainty is counted
         return [*notices, *_check_signs(fit)]
-    tilting = {p.name for effect in robot.effects if effect.tilts for p in effect.parameters}
+    tilting = {p.name for effect in robot.effects if effect.tilts and effect.loaded for p in effect.parameters}
     assumed = [
         joint.name
         for number, joint in enumerate(robot.joints, 1)

@@ -45,6 +45,7 @@ def shares_block(shares: Shares) -> Block:
                 "periods": line.periods,
                 "aliases": list(line.aliases),
                 "amplitude_mdeg": math.degrees(line.amplitude) * 1e3,
+                "chance": line.chance,
             }
             for line in shares.lines
         ],

@@ -20,7 +20,7 @@ from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import Model, named_model
 from truearm.engine.fit.rounds import Redundant
-from truearm.engine.fit.transmission import PeriodicError, periodic_errors
+from truearm.engine.fit.transmission import LARGEST_CHANCE, PeriodicError, periodic_errors
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.effects.balancing import Balancing
@@ -35,6 +35,8 @@ AUTO: Final = "auto"
 _ASKED_FOR: Final = frozenset({LinearContactClearance.name})
 #: Numbers of periods that a joint may have.
 _LINES: Final = 8
+#: How many lines as strong as the weakest chance would show: those that are not there shrink as all else does.
+_CHANCE: Final = 1.0
 #: Fits at most, each with the periodic errors that the one before left.
 _FITS: Final = 3
 #: What an effect moves the targets by, a root mean square, from which it is counted [m].
@@ -149,7 +151,7 @@ def identify_every_effect(
             seed=seed,
             progress=progress,
         )
-        more = periodic_errors(fit, data, most=_LINES)
+        more = periodic_errors(fit, data, _LINES, _CHANCE)
         if not more:
             break
         robot, lines = with_lines(robot, more), (*lines, *more)
@@ -278,13 +280,14 @@ def check_shares(shares: Shares) -> list[Notice]:
                 "middle of this one."
             )
         )
-    if shares.lines:
+    certain = [line for line in shares.lines if line.chance < LARGEST_CHANCE]
+    if certain:
         notices.append(
             PERIODS_FOUND(
                 f"Errors that repeat with the joints' angles were found and taken out: "
-                f"{'; '.join(line.words for line in shares.lines)}. The numbers of periods stand in the calibrated "
+                f"{'; '.join(line.words for line in certain)}. The numbers of periods stand in the calibrated "
                 "robot as transmission_periods.",
-                "warning" if any(line.aliases for line in shares.lines) else "note",
+                "warning" if any(line.aliases for line in certain) else "note",
             )
         )
     return notices

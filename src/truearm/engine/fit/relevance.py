@@ -227,7 +227,7 @@ def _tried(most: float) -> Array:
 
 def _believed(deviations: Array, scale: float) -> Array:
     """Return how likely deviations are beforehand, where they are tried evenly in their logarithms."""
-    return np.asarray(deviations / (1.0 + (deviations / (_SCALE * scale)) ** 2))
+    return np.asarray(1.0 / (1.0 + (deviations / (_SCALE * scale)) ** 2))
 
 
 #: Of a model whose effects have the sizes that their priors say.

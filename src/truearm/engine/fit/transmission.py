@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -20,14 +20,17 @@ from numpy.typing import NDArray
 from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.fit import Fit
+from truearm.engine.fit.likelihood import Visits, Whitening
+from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array
+from truearm.engine.robot.parameters import FreeParameters
 from truearm.engine.robot.robot import Robot
 
 #: Periods in a turn that are looked at; fewer than the first are the Fourier series' business.
 FEWEST: Final = 20
 _PERIODS: Final = np.arange(FEWEST, 401)
 #: A periodic error is believed if chance would show one as strong in any joint less often than this.
-_LARGEST_CHANCE: Final = 1e-3
+LARGEST_CHANCE: Final = 1e-3
 LEAST_CONFIGURATIONS: Final = 60  # configurations
 #: Largest standard deviation of an amplitude [rad] at which the readings see a gear; good ones err by less.
 _LARGEST_DEVIATION: Final = 5e-4
@@ -75,46 +78,50 @@ class Pulls:
     free: int  #: Equations beyond the parameters: targets of a configuration share its errors, and count as one.
 
 
-def periodic_errors(fit: Fit, data: Dataset, most: int = 1) -> tuple[PeriodicError, ...]:
+def periodic_errors(
+    fit: Fit, data: Dataset, most: int = 1, chance: float = LARGEST_CHANCE
+) -> tuple[PeriodicError, ...]:
     """Return the periodic errors of joints that the robot file does not describe.
 
     Args:
         fit: What is left over is seen from it.
         data: The readings it is held against; fewer than 60 configurations say nothing.
         most: How many a joint may have, see :func:`lines_of`.
+        chance: How many as strong as the weakest chance would show, at most.
     """
     robot = fit.robot
     if data.configurations < LEAST_CONFIGURATIONS or not data.has_position.any():
         return ()
-    at = robot.loaded(data.postures)
+    read = replace(data.of_readings(data.has_position), quaternion=None, setup=None)
+    problem = Problem(robot, read, FreeParameters(()), dict(fit.sigma))
+    here = problem.at(np.zeros(0))
+    G, r = here.by_joints, here.residual
+    if fit.joint_error.any():
+        whitening = Whitening(Visits(problem.visits), G * fit.joint_error)
+        G, r = whitening.applied(G), whitening.applied(r)
+    configuration = np.concatenate(
+        [np.repeat(read.configuration[block.readings], block.observation.components) for block in problem.blocks]
+    )
     count = len(robot.joints)
-    # Of each configuration, summed over its position readings: J'r and J'J by joints, r'r, and how many there are.
-    pull, weight = np.zeros((len(at), count)), np.zeros((len(at), count, count))
-    left, readings = np.zeros(len(at)), np.zeros(len(at))
-    for index, name in enumerate(data.targets):
-        rows = np.flatnonzero((data.target == index) & data.has_position)
-        configuration = data.configuration[rows]
-        kinematics = robot.forward_kinematics(at, name)
-        rate = kinematics.position_jacobian(robot.moving[:count])[..., configuration]
-        residual = data.position[rows].T - kinematics.position[:, configuration]
-        np.add.at(pull, configuration, np.einsum("jan,an->nj", rate, residual))
-        np.add.at(weight, configuration, np.einsum("jan,kan->njk", rate, rate))
-        np.add.at(left, configuration, (residual**2).sum(0))
-        np.add.at(readings, configuration, 1.0)
-    free = 3 * int((readings > 0).sum()) - len(fit.free.names)
-    return lines_of(robot, Pulls(at.joints, pull, weight, float(left.sum()), free), most=most)
+    pull, weight = np.zeros((read.configurations, count)), np.zeros((read.configurations, count, count))
+    np.add.at(pull, configuration, -G * r[:, None])
+    np.add.at(weight, configuration, G[:, :, None] * G[:, None, :])
+    free = max(problem.rows - round(fit.spent), 1)
+    return lines_of(robot, Pulls(read.joints, pull, weight, float(r @ r), free), most, chance)
 
 
-def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST, most: int = 1) -> tuple[PeriodicError, ...]:
+def lines_of(
+    robot: Robot, pulls: Pulls, most: int = 1, largest_chance: float = LARGEST_CHANCE
+) -> tuple[PeriodicError, ...]:
     """Return the periodic errors of a robot's joints that it does not know, the strongest of a joint first.
 
     Fewer than 60 configurations say nothing.
 
     Args:
-        fewest: Periods in a turn that are looked for, at least.
         most: How many a joint may have, those that the robot knows included: with 1, joints whose gear it knows are
             left alone. Of a joint that may have more, those that it knows are taken out of the pulls, and others are
             looked for where its range tells them from these.
+        largest_chance: How many as strong as the weakest chance would show, at most.
     """
     if len(pulls.joints) < LEAST_CONFIGURATIONS:
         return ()
@@ -128,11 +135,11 @@ def lines_of(robot: Robot, pulls: Pulls, fewest: int = FEWEST, most: int = 1) ->
     while open_joints := [i for i, periods in taken.items() if len(periods) < most]:
         pull, total, free = _left(pulls, taken)
         noise = total / max(free, 1)
-        tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise, fewest, taken[i]), i) for i in open_joints]
+        tried = [(*_strongest(q[:, i], pull[:, i], weight[:, i, i], noise, taken[i]), i) for i in open_joints]
         explained, periods, a, b, joint = max(tried)
         agreement = min(free * explained / total, _agreement(periods * q[:, joint], pull[:, joint]))
         chance = len(open_joints) * len(_PERIODS) * math.exp(-0.5 * agreement)
-        if chance >= _LARGEST_CHANCE:
+        if chance >= largest_chance:
             break
         wave = a * np.sin(periods * q[:, joint]) + b * np.cos(periods * q[:, joint])
         aliases = _aliases(q[:, joint], wave, weight[:, joint, joint], periods)
@@ -162,7 +169,7 @@ def _left(pulls: Pulls, taken: Mapping[int, Sequence[int]]) -> tuple[Array, floa
 
 
 def _strongest(
-    q: Array, pull: Array, weight: Array, noise: float, fewest: int, taken: Sequence[int]
+    q: Array, pull: Array, weight: Array, noise: float, taken: Sequence[int]
 ) -> tuple[float, int, float, float]:
     """Return what the best sine explains of the squared residuals [m^2], its periods, and its two amplitudes [rad].
 
@@ -172,10 +179,9 @@ def _strongest(
         q: Positions of the joint [rad], ``(n,)``.
         pull, weight: J'r [m^2] and J'J [m^2] of the joint, ``(n,)``.
         noise: Variance of a coordinate of the residuals [m^2].
-        fewest: Periods in a turn that are looked for, at least.
         taken: Numbers of periods that are taken out, whose neighbours say nothing new.
     """
-    among = _PERIODS[fewest - FEWEST :]
+    among = _PERIODS
     explained, a, b, least = _sines(q, pull, weight, among)
     passed = among * math.sqrt(12.0) * q.std() / (2.0 * math.pi)  # of a range that is passed through evenly
     seen = (least * _LARGEST_DEVIATION**2 > noise) & (passed > _LEAST_PERIODS)

@@ -301,6 +301,7 @@ def _beside(parts: Sequence[Number], axes: int) -> Array:
 #: The two axes that a turn about axis k turns, the first towards the second.
 _TURNED: Final = ((1, 2), (2, 0), (0, 1))
 _TURNS: Final[tuple[Motion, Motion, Motion]] = ("Rx", "Ry", "Rz")
+_SLIDES: Final[tuple[Motion, Motion, Motion]] = ("Tx", "Ty", "Tz")
 _UNITS: Final[tuple[Direction, Direction, Direction]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -411,6 +412,13 @@ def turn_about(axis: Direction, variable: int) -> Element:
     if axis in _UNITS:
         return Element(_TURNS[_UNITS.index(axis)], variable=variable)
     return Element("R", axis=axis, variable=variable)
+
+
+def slide_along(axis: Direction, variable: int) -> Element:
+    """Return the element that slides by a variable alone along a unit vector in the moving frame."""
+    if axis in _UNITS:
+        return Element(_SLIDES[_UNITS.index(axis)], variable=variable)
+    return Element("T", axis=axis, variable=variable)
 
 
 def _axis(element: Element, axes: Axes) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate
@@ -131,6 +132,25 @@ def joint_loads(
         for place, (pull, turn) in balancer_wrenches(robot, balancer, elements, moves, ends, robot.values):
             applied.setdefault(place, []).append((_scaled(pull, factor), _scaled(turn, factor)))
     return _carried(robot, elements, moves, applied, (force, moment), size)
+
+
+def free_fall(robot: Robot, variables: Array) -> Array:
+    """Return the direction in which gravity falls in the axes of :func:`joint_loads`, ``(joints, 3, n)``.
+
+    It is that of an arm at rest: a unit vector, or zero where there is no gravity. `variables` are those of
+    :func:`joint_loads`.
+    """
+    found = np.zeros((len(robot.joints), 3, np.shape(variables)[-1]))
+    size = math.hypot(*robot.gravity)
+    fall: Coordinates = _scaled(robot.gravity, 1.0 / size) if size else _ZERO
+    moves = robot.arm.forward_kinematics(variables, robot.values).moves
+    for element, move in zip(robot.arm.elements, moves, strict=True):
+        if move and element.turns:
+            fall = in_frame_behind(fall, element, move)
+        if element.variable is not None and element.variable < len(found):
+            for row, axis in zip(found[element.variable], (*across(element), axis_of(element)), strict=True):
+                row[:] = _along(axis, fall)
+    return found
 
 
 def _refuse_other_shapes(
@@ -275,12 +295,12 @@ def postures_in_equilibrium(robot: Robot, at: Postures) -> Postures:
 
     def deflected(rows: NDArray[np.intp], variables: Array) -> Array:
         part = at.at(rows)
-        return robot.variables(replace(part, loads=_loads(robot, part, variables)), robot.values)
+        return robot.variables(carrying(robot, part, variables), robot.values)
 
     straight = robot.without_deflections(at.joints.T)
-    start = robot.variables(replace(at, loads=_loads(robot, at, straight)), robot.values)
+    start = robot.variables(carrying(robot, at, straight), robot.values)
     variables = settled(deflected, start)
-    loaded = replace(at, loads=_loads(robot, at, variables))
+    loaded = carrying(robot, at, variables)
     factors = [f"balancer_{number}" for number in range(1, len(robot.balancers) + 1)]
     if not factors or factors[0] not in robot.parameters:
         return loaded
@@ -298,17 +318,24 @@ def joint_efforts(robot: Robot, q: Array | Postures) -> Array:
     return np.ascontiguousarray(np.array(rows).T)
 
 
-def joints_in_equilibrium(robot: Robot, variables: Array) -> Array:
-    """Return the joint positions ``(joints, n)`` that lead to variables, whose loads are known from the start."""
-    loads = joint_loads(robot, variables) if any(effect.loaded for effect in robot.effects) else None
+def postures_behind(robot: Robot, variables: Array) -> Postures:
+    """Return the postures that lead to variables ``(joints or more, n)``, whose loads are known from the start."""
     turned = variables[: len(robot.joints)]
+    there = carrying(robot, Postures(turned.T), variables) if robot.bends else Postures(turned.T)
 
     def corrected(rows: NDArray[np.intp], joints: Array) -> Array:
-        at = Postures(joints.T, loads=None if loads is None else loads[:, :, rows])
+        loads, fall = (None if part is None else part[:, :, rows] for part in (there.loads, there.fall))
+        at = Postures(joints.T, loads=loads, fall=fall)
         missing = turned[:, rows] - robot.variables(at, robot.values)[: len(joints)]
         return np.asarray(joints + missing)
 
-    return settled(corrected, turned)
+    return replace(there, joints=np.ascontiguousarray(settled(corrected, turned).T))
+
+
+def carrying(robot: Robot, at: Postures, variables: Array) -> Postures:
+    """Return postures with what the joints of the arm carry that stands at some variables."""
+    fall = free_fall(robot, variables) if any(effect.falls for effect in robot.effects) else None
+    return replace(at, loads=_loads(robot, at, variables), fall=fall)
 
 
 def _loads(robot: Robot, at: Postures, variables: Array) -> Array:

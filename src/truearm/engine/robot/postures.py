@@ -34,6 +34,9 @@ class Postures:
     #: Force and moment of everything beyond each joint, in the joint's own axes, ``(joints, 6, n)``, as
     #: :meth:`truearm.engine.robot.robot.Robot.loaded` finds them.
     loads: Array | None = None
+    #: Direction in which gravity falls, in the axes of the loads, ``(joints, 3, n)``, zero without gravity; found with
+    #: the loads where an effect depends on it.
+    fall: Array | None = None
     #: What of the loads each balancer contributes at the factor 1, ``(balancers, joints, 6, n)``, and the factors that
     #: the loads are of; None where no factor is a parameter.
     relief: tuple[Array, tuple[float, ...]] | None = None
@@ -49,6 +52,13 @@ class Postures:
         if self.loads is None:
             raise ValueError("the postures have no loads; ask Robot.loaded for them")
         return self.loads
+
+    @property
+    def free_fall(self) -> Array:
+        """The directions in which gravity falls, of postures that have them."""
+        if self.fall is None:
+            raise ValueError("the postures have no direction of gravity; ask Robot.loaded for them")
+        return self.fall
 
     def relieved(self, values: Mapping[str, float | Array]) -> Postures:
         """Return them with the loads of other factors of the balancers; values may be ``(trials, 1)``.
@@ -85,6 +95,7 @@ class Postures:
             temperature=part(self.temperature),
             wrench=part(self.wrench),
             loads=None,
+            fall=None,
             relief=None,
         )
 
@@ -92,7 +103,8 @@ class Postures:
         """Return those from one to before another, with their loads."""
         relief = None if self.relief is None else (self.relief[0][..., first:end], self.relief[1])
         loads = None if self.loads is None else self.loads[..., first:end]
-        return replace(self.at(np.arange(first, end)), loads=loads, relief=relief)
+        fall = None if self.fall is None else self.fall[..., first:end]
+        return replace(self.at(np.arange(first, end)), loads=loads, fall=fall, relief=relief)
 
 
 def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:

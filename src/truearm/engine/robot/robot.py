@@ -16,7 +16,7 @@ from truearm.engine.base.errors import InputError, did_you_mean, wrong_kind
 from truearm.engine.robot.chain import Array, ForwardKinematics
 from truearm.engine.robot.effects import checked_effects
 from truearm.engine.robot.frames import Frame, fixtures_placed, forward, jacobian, placed
-from truearm.engine.robot.loads import joint_loads, joints_in_equilibrium, postures_in_equilibrium
+from truearm.engine.robot.loads import carrying, postures_behind, postures_in_equilibrium
 from truearm.engine.robot.parameters import SCALE, SCALE_GROUP, Parameter, by_parameters, effect_rates
 from truearm.engine.robot.parts import FixtureKind, Payload, checked_gravity
 from truearm.engine.robot.postures import Postures
@@ -203,7 +203,7 @@ class Robot(RobotData):
     # -- kinematics ----------------------------------------------------------------------------------------
 
     def loaded(self, q: Array | Postures) -> Postures:
-        """Return postures with the loads at every joint, if the robot has effects that depend on them.
+        """Return postures with loads and direction of gravity at every joint, if the robot has effects that need them.
 
         The loads are those of the arm at rest in its own deflections, with the robot's own parameter values: what a
         solver tries meanwhile moves them by less than a hundredth, and it asks again where it has come to.
@@ -217,14 +217,15 @@ class Robot(RobotData):
                 came=f"an array of shape {at.joints.shape}",
                 allowed=f"(n, {len(self.joints)})",
             )
-        if at.loads is not None or not any(effect.loaded for effect in self.effects):
+        fallen = at.fall is not None or not any(effect.falls for effect in self.effects)
+        if (at.loads is not None and fallen) or not self.bends:
             return at
         return postures_in_equilibrium(self, at)
 
     def variables(self, q: Array | Postures, values: Values) -> Array:
         """Return the variables ``(joints or more, ..., n)`` of the trunk behind the joint positions `q`.
 
-        Those of the joints come first; the rest of :attr:`layout` is there if some effect tilts or stretches.
+        Those of the joints come first; the rest of :attr:`layout` is there if some effect tilts, stretches or shifts.
         """
         at = self.loaded(q).relieved(values)
         joints = np.ascontiguousarray(at.joints.T)
@@ -255,7 +256,7 @@ class Robot(RobotData):
                 came=f"an array of shape {variables.shape}",
                 allowed=f"({len(self.moving)}, n)",
             )
-        return np.ascontiguousarray(joints_in_equilibrium(self, variables).T)
+        return postures_behind(self, variables).joints
 
     def without_deflections(self, joints: Array) -> Array:
         """Return the variables ``(joints or more, n)`` of joints ``(joints, n)`` that turn and do nothing else."""
@@ -264,17 +265,23 @@ class Robot(RobotData):
     def tilted(self, variables: Array) -> Array:
         """Return variables ``(joints or more, n)`` with the tilts that the loads of the arm make as it stands there.
 
-        So with what lengths have grown where nothing but the joint positions is known. What was tilted before counts
-        for the loads alone; asked again for what came out, they are a thousandth nearer to equilibrium.
+        So with what lengths have grown and axes have moved where nothing but the joint positions is known. What was
+        tilted before counts for the loads alone; asked again for what came out, they are a thousandth nearer to
+        equilibrium.
         """
-        tilting = [effect for effect in self.effects if effect.tilts or effect.stretches]
+        tilting = [effect for effect in self.effects if effect.tilts or effect.stretches or effect.shifts]
         if not tilting:
             return variables
         joints = variables[: len(self.joints)]
-        tilted, at = self.without_deflections(joints), Postures(joints.T, loads=joint_loads(self, variables))
+        if any(effect.shifts for effect in tilting):  # which follow the joint positions
+            at = postures_behind(self, variables)
+        else:
+            at = carrying(self, Postures(joints.T), variables)
+        tilted = self.without_deflections(joints)
         for effect in tilting:
             for variable, part in effect.deflection(at, self.values).items():
-                tilted[variable] += part
+                if variable >= len(joints):
+                    tilted[variable] += part
         return tilted
 
     def forward_kinematics(

@@ -14,7 +14,7 @@ from truearm.engine.base.errors import InputError, as_html, counted, did_you_mea
 from truearm.engine.base.units import Marked, mark_lines
 from truearm.engine.robot.balancers import Balancer
 from truearm.engine.robot.bearings import AxialSlides, bearing_elements, carried_by
-from truearm.engine.robot.chain import Chain, Element, Offset, across, turn_about
+from truearm.engine.robot.chain import Chain, Element, Offset, across, axis_of, slide_along, turn_about
 from truearm.engine.robot.controller import AS_THE_MODEL, Controller
 from truearm.engine.robot.conventions import convention
 from truearm.engine.robot.conventions.convention import Convention
@@ -161,19 +161,26 @@ class RobotData:
 
     @cached_property
     def moved_links(self) -> tuple[tuple[Element, ...], ...]:
-        """The way along each link, as :attr:`link_elements`, with what joint effects tilt and stretch."""
+        """The way along each link, as :attr:`link_elements`, with what joint effects tilt, stretch and shift."""
         tilts = any(effect.tilts for effect in self.effects)
         stretches = any(effect.stretches for effect in self.effects)
+        shifts = any(effect.shifts for effect in self.effects)
         slides = iter(range(len(self.layout.lengths)))
 
         def moved(joint: int, element: Element) -> tuple[Element, ...]:
             if stretches and _has_length(element):
                 return (replace(element, variable=self.layout.length(next(slides))),)
-            if tilts and element.variable is not None:
+            if element.variable is None:
+                return (element,)
+            parts: tuple[Element, ...] = (element,)
+            if shifts:
+                own = zip((*across(element), axis_of(element)), self.layout.shift(joint), strict=True)
+                parts = (*(slide_along(axis, variable) for axis, variable in own), *parts)
+            if tilts:
                 across_it = zip(across(element), self.layout.tilt(joint), strict=True)
                 turns = tuple(turn_about(axis, variable) for axis, variable in across_it)
-                return (element, *_about_bearing(turns, bearing_elements(element, *self._bearing(joint))))
-            return (element,)
+                parts = (*parts, *_about_bearing(turns, bearing_elements(element, *self._bearing(joint))))
+            return parts
 
         return tuple(
             tuple(part for element in link for part in moved(joint, element))
@@ -221,6 +228,11 @@ class RobotData:
         """The joint effects of the model."""
         return tuple(effect(self.layout) for effect in EFFECTS if effect.name in self.effect_names)
 
+    @property
+    def bends(self) -> bool:
+        """Whether joint effects depend on the loads, or on the direction of gravity: postures then need both."""
+        return any(effect.loaded or effect.falls for effect in self.effects)
+
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:
         """All parameters by name: base, joints, effects, targets, fixtures."""
@@ -263,8 +275,7 @@ class RobotData:
     def moving(self) -> list[int]:
         """Index of the element that each variable of the trunk moves, joints first."""
         places = {e.variable: i for i, e in enumerate(self.trunk.elements) if e.variable is not None}
-        count = self.layout.variables if len(places) > len(self.joints) else len(self.joints)
-        return [places.get(i, -1) for i in range(count)]
+        return [places.get(i, -1) for i in range(max(places, default=-1) + 1)]
 
 
 def _about_bearing(turns: tuple[Element, ...], slides: tuple[Element, Element] | None) -> tuple[Element, ...]:

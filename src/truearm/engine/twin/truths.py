@@ -125,6 +125,16 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         lines = ((k, of(f"transmission_sin{k}", number), of(f"transmission_cos{k}", number)) for k in further)
         return tuple((k, math.hypot(s, c), math.atan2(c, s)) for k, s, c in (*parts, *curve, gear, *lines) if s or c)
 
+    def bending(number: int) -> tuple[tuple[float, float, float], ...]:
+        rows = tuple(
+            (of(f"bending_{a}x", number), of(f"bending_{a}y", number), of(f"bending_{a}z", number)) for a in "xyz"
+        )
+        return rows if any(map(any, rows)) else ()
+
+    def run_out(number: int) -> tuple[tuple[float, float], ...]:
+        pairs = tuple((of(f"run_out_{a}_sin", number), of(f"run_out_{a}_cos", number)) for a in "xyz")
+        return pairs if any(map(any, pairs)) else ()
+
     truths = {
         number: JointTruth(
             compliance=of("compliance", number),
@@ -135,6 +145,8 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
             bearing=of("bearing_compliance", number),
             gear=sines(number),
             hysteresis=of("approach", number),
+            bending=bending(number),
+            run_out=run_out(number),
             growth=of("thermal_growth", number),
             warm_up=of("warm_up", number),
         )

@@ -207,6 +207,19 @@ def forces_on_tool(wrench: Wrench, flange: Array, turned: Array) -> Array:
     return carried
 
 
+def _slid(aside: Array) -> Array:
+    """Return slides by ``(n, 3)`` [m] as ``(n, 4, 4)``."""
+    T = np.tile(_IDENTITY, (len(aside), 1, 1))
+    T[:, :3, 3] = aside
+    return T
+
+
+def _direction(gravity: Array) -> Array:
+    """Return the unit vector along gravity, zero without any."""
+    size = float(np.linalg.norm(gravity))
+    return gravity / size if size else gravity
+
+
 def tilt(alpha: Array, beta: Array) -> Array:
     """Return ``Rx(alpha) Ry(beta)`` ``(n, 4, 4)``."""
     about_x, about_y = generator(Element("Rx")), generator(Element("Ry"))
@@ -351,6 +364,7 @@ class Posture:
     #: What each joint leans about x and y and turns about, or slides along, z beyond its joint position ``(joints,
     #: 3)``.
     deflection: Array
+    fall: Array  #: Unit vectors ``(joints, 3)`` in which gravity falls, in the axes of the loads; zero without gravity.
     #: External force [N] and moment about the flange's origin [N m] on the flange, in base axes, ``(6,)``.
     wrench: Array
 
@@ -361,6 +375,7 @@ class Posture:
             targets={name: at[row] for name, at in self.targets.items()},
             loads=self.loads[row],
             deflection=self.deflection[row],
+            fall=self.fall[row],
             wrench=self.wrench[row],
         )
 
@@ -381,7 +396,8 @@ class Twin:
             if not 1 <= number <= count:
                 raise InputError("the robot has no such joint", where=where, allowed=f"1 to {count}")
             link = self._plain[number - 1]
-            if (truth.clearance or truth.bearing) and not (link.turns and link.generator[1, 0] == 1.0):
+            aside = truth.clearance or truth.bearing or truth.bending or truth.run_out
+            if aside and not (link.turns and link.generator[1, 0] == 1.0):
                 raise InputError("only a joint that turns about its frame's z can tilt", where=where)
 
     def target_frames(self, joints: Array) -> Mapping[str, Array]:
@@ -437,21 +453,26 @@ class Twin:
         truths = [self.joints.get(number, PERFECT) for number in range(1, len(links) + 1)]
         geared = joints * [self.robot.values.get(f"gain_{number}", 1.0) for number in range(1, len(links) + 1)]
 
-        def deflections(rows: IntArray, loads: Array) -> Array:
+        aside = np.stack([truth.carried_aside(joints[:, j]) for j, truth in enumerate(truths)], axis=1)
+
+        def deflections(rows: IntArray, loads: Array, fall: Array) -> Array:
             deflected = np.zeros((len(rows), len(links), 3))
             for j, (truth, link) in enumerate(zip(truths, links, strict=True)):
                 if truth is not PERFECT:
                     deflected[:, j, :2] = np.transpose(truth.tilt(loads[:, j, 3], loads[:, j, 4], self.contact))
                     along = loads[:, j, 5 if link.turns else 2]
                     deflected[:, j, 2] = truth.turn(joints[rows, j], approach[rows, j], along)
+                    deflected[:, j] += truth.bent(fall[:, j])
             return deflected
 
         left = np.arange(len(joints))
-        settled, settled_postures = deflections(left, np.zeros((len(left), len(links), 6))), dict[int, Posture]()
+        nothing = np.zeros((len(left), len(links), 6))
+        settled, settled_postures = deflections(left, nothing, nothing[:, :, :3]), dict[int, Posture]()
         for last in (*[False] * (_ROUNDS - 1), True):
             deflection, own = settled, tuple(link.of_rows(left) for link in links)
-            standing = self._standing(own, geared[left], deflection, wrench[left], velocity[left], acceleration[left])
-            settled = deflections(left, standing.loads)
+            given = (aside[left], wrench[left], velocity[left], acceleration[left])
+            standing = self._standing(own, geared[left], deflection, *given)
+            settled = deflections(left, standing.loads, standing.fall)
             rests = (np.abs(settled - deflection).max(axis=(1, 2)) < _SETTLED) | last
             settled_postures |= {int(left[row]): standing.of_row(row) for row in np.flatnonzero(rests).tolist()}
             left, settled = left[~rests], settled[~rests]
@@ -464,6 +485,7 @@ class Twin:
         links: tuple[Link, ...],
         geared: Array,
         deflection: Array,
+        aside: Array,
         wrench: Array,
         velocity: Array,
         acceleration: Array,
@@ -474,6 +496,8 @@ class Twin:
         T[0] = np.eye(4)
         axes, frames, ways = [], [], []
         for j, link in enumerate(links):
+            if aside[:, j].any():
+                link = replace(link, before=link.before @ _slid(aside[:, j]))
             T = moved(T, link, geared[:, j] + deflection[:, j, 2], velocity[:, j], acceleration[:, j])
             axes.append(T[0] @ link.axes)
             if deflection[:, j, :2].any():
@@ -500,6 +524,7 @@ class Twin:
             targets={name: world @ place for name, place in self._targets.items()},
             loads=wrench_at(carried, np.stack(axes, axis=1)),
             deflection=deflection,
+            fall=_direction(gravity) @ np.stack(axes, axis=1)[..., :3, :3],
             wrench=wrench_at(pushed, at_flange),
         )
 

@@ -44,6 +44,12 @@ class JointTruth:
     bumps: tuple[tuple[float, float, float], ...] = ()
     #: What the joint turns too far [rad] when its last move was forward, and too little when it was backward.
     hysteresis: float = 0.0
+    #: Turn of the arm about x, y and z of the joint [rad] per x, y and z of the direction in which gravity falls: a row
+    #: for each axis turned about; empty where nothing bends.
+    bending: tuple[tuple[float, float, float], ...] = ()
+    #: How far the axis is carried along x, y and z of the joint before its turn [m]: sine and cosine of the position
+    #: for each; empty where it stays.
+    run_out: tuple[tuple[float, float], ...] = ()
     growth: float = 0.0  #: Thermal growth of the lengths of the link behind the joint [1/K].
     warm_up: float = 0.0  #: Share by which those lengths are shorter when a campaign begins than when the arm is warm.
 
@@ -76,6 +82,16 @@ class JointTruth:
         across, along = math.tan(self.clearance) * np.sin(gamma), math.tan(self.clearance) * np.cos(gamma)
         laid_x, laid_y = _sign(x) * across / np.hypot(1.0, across), _sign(y) * along / np.hypot(1.0, along)
         return laid_x + self.bearing * x, laid_y + self.bearing * y
+
+    def bent(self, fall: Array) -> Array:
+        """Return what the arm turns about x, y and z of the joint [rad] as gravity falls along ``(n, 3)``."""
+        about = [sum(row[k] * fall[:, k] for k in range(3)) for row in self.bending]
+        return np.stack(about, axis=1) if about else np.zeros(fall.shape)
+
+    def carried_aside(self, position: Array) -> Array:
+        """Return how far the axis is carried along x, y and z ``(n, 3)`` [m] at positions ``(n,)``."""
+        circles = [math.hypot(s, c) * np.sin(position + math.atan2(c, s)) for s, c in self.run_out]
+        return np.stack(circles, axis=1) if circles else np.zeros((len(position), 3))
 
 
 #: Follows its commanded position and nothing else.

@@ -32,6 +32,7 @@ from truearm.engine.robot.conversion.links import (
     translations,
     zero_reference,
 )
+from truearm.engine.robot.conversion.own_axes import in_its_axes
 from truearm.engine.robot.lines import at_zero, base_and_flange, joint_axes
 from truearm.engine.robot.parts import Inertia, Joint, LinkMass
 from truearm.engine.robot.robot import Robot
@@ -125,6 +126,7 @@ def converted(robot: Robot, convention_name: str) -> Robot:
         *(["the base frame now lies on the first axis"] if moved else []),
         *([f"left out: {' and '.join(lost)}"] if lost else []),
     ]
+    result = in_its_axes(robot, result)
     return replace(
         result,
         joints=_with_bearings(robot, result),

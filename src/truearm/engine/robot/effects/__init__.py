@@ -22,6 +22,8 @@ from truearm.engine.robot.effects.gain import Gain
 from truearm.engine.robot.effects.hardening import Hardening
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.effects.linear_contact import LinearContactClearance
+from truearm.engine.robot.effects.link_bending import LinkBending
+from truearm.engine.robot.effects.run_out import RunOut
 from truearm.engine.robot.effects.thermal import ThermalGrowth
 from truearm.engine.robot.effects.transmission import TransmissionError
 from truearm.engine.robot.effects.warm_up import WarmUp
@@ -37,6 +39,8 @@ EFFECTS: Final[tuple[type[Effect], ...]] = (
     BearingCompliance,
     Clearance,
     LinearContactClearance,
+    LinkBending,
+    RunOut,
     Balancing,
     Approach,
     ThermalGrowth,

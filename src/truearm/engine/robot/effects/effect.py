@@ -21,7 +21,7 @@ Rates = Mapping[str, Mapping[int, Array]]
 
 @dataclass(frozen=True)
 class Layout:
-    """Which variables the chain of a robot has: its joints, two tilts behind each of them, and its lengths."""
+    """The variables of a robot's chain: joints, two tilts behind and three slides before each of them, and lengths."""
 
     kinds: tuple[JointKind, ...]  #: Kind of each joint; variable i moves joint i, from 0.
     #: Joint (from 0) and nominal value [m] of each slide of fixed length along the links.
@@ -40,11 +40,6 @@ class Layout:
         """The revolute joints."""
         return tuple(i for i in self.joints if self.kinds[i] == "revolute")
 
-    @property
-    def variables(self) -> int:
-        """How many variables there are."""
-        return 3 * len(self.kinds) + len(self.lengths)
-
     def tilt(self, joint: int) -> tuple[int, int]:
         """Return the variables of the tilts of a joint about its x and its y, which turns with the joint."""
         first = len(self.kinds) + 2 * joint
@@ -53,6 +48,11 @@ class Layout:
     def length(self, number: int) -> int:
         """Return the variable that is added to entry `number` of `lengths`."""
         return 3 * len(self.kinds) + number
+
+    def shift(self, joint: int) -> tuple[int, int, int]:
+        """Return the variables of the slides of a joint along its own axes, as they are before it turns."""
+        first = 3 * len(self.kinds) + len(self.lengths) + 3 * joint
+        return first, first + 1, first + 2
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,11 @@ class Effect(ABC):
     loaded: ClassVar[bool] = False
     ordered: ClassVar[bool] = False
     warmed: ClassVar[bool] = False
-    tilts: ClassVar[bool] = False  #: tilts, stretches: whether it tilts joints, or changes lengths.
+    falls: ClassVar[bool] = False  #: Whether it depends on the direction of gravity, whatever the loads.
+    #: tilts, stretches, shifts: whether it tilts joints, changes lengths, or moves the axes of joints.
+    tilts: ClassVar[bool] = False
     stretches: ClassVar[bool] = False
+    shifts: ClassVar[bool] = False
     #: Whether its parameters are springs, plays or gaps: nobody may state a negative one, and one that a fit finds is
     #: told.
     non_negative: ClassVar[bool] = False

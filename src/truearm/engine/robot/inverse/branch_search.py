@@ -121,6 +121,9 @@ class Candidates:
         changed = np.flatnonzero((np.abs(turns) > 1.0).any(axis=1))
         # A whole turn on, the arm stands as it stood; a joint effect (a gain) need not be the same there.
         variables[: joints.shape[1], changed] += turns[changed].T
+        if len(changed) and any(effect.shifts for effect in robot.effects):  # an axis is elsewhere, if there is a gain
+            again = solve(part.of(changed), variables[: joints.shape[1], changed].T, most=most)
+            variables[:, changed], error[changed] = again.variables, again.error
         joints[changed] = robot.joints_of(variables[:, changed])
         position, angle = part.distances(error)
         number = np.full(len(pose), -1)

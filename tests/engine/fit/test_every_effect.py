@@ -31,6 +31,7 @@ from truearm.engine.fit.every_effect import (
 from truearm.engine.fit.fit import Fit, Status, identify
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import Model, named_model
+from truearm.engine.fit.transmission import LARGEST_CHANCE
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.library import load_robot
@@ -167,7 +168,7 @@ def test_shares_tell_what_the_data_know() -> None:
         assert 0.0 <= one.known <= one.parameters + 1e-9, one
         assert (one.effect in fit.model.effects) == (one.moves is not None), one
     assert share(shares, "fourier").known > 23.0
-    assert share(shares, "compliance").known == pytest.approx(5.0, abs=0.1)  # gravity cannot turn axis 1
+    assert 4.0 < share(shares, "compliance").known < 5.05  # gravity cannot turn axis 1
 
 
 # -- the same, however it is asked -------------------------------------------------------------------------
@@ -346,20 +347,23 @@ def test_periods_that_nobody_gave_are_found_and_taken_out() -> None:
     unknown, rng = without_periods(load_robot("irb120")), np.random.default_rng(1)
     data = geared((200, 2e-4, 0.7), unknown.random_configurations(90, rng), rng)
     robot, fit, shares = identify_every_effect(unknown, data)
-    assert [(line.joint, line.periods, line.aliases) for line in shares.lines] == [(3, 200, ())]
-    assert [joint.periods for joint in robot.joints] == [(), (), (200,), (), (), ()]
+    certain, *by_chance = sorted(shares.lines, key=lambda line: line.chance)
+    assert (certain.joint, certain.periods, certain.aliases) == (3, 200, ())
+    assert certain.chance < 1e-6 < LARGEST_CHANCE < min((line.chance for line in by_chance), default=1.0)
+    assert robot.joints[2].periods[0] == 200
     sine, cosine = (fit.robot.values[f"transmission_{part}_3"] for part in ("sin", "cos"))
     assert np.hypot(sine, cosine) == pytest.approx(2e-4, rel=0.1)
     notice = found_in(shares, "periods-found")
     assert notice.level == "note"
     assert "joint 3 200 times in a turn, by" in notice.message
+    assert "joint 4" not in notice.message
 
 
 def test_positions_on_whole_steps_cannot_tell_periods_apart_and_it_is_said() -> None:
     unknown, rng = without_periods(load_robot("irb120")), np.random.default_rng(5)
     joints = np.radians(np.round(np.degrees(unknown.random_configurations(90, rng))))
     _, _, shares = identify_every_effect(unknown, geared((200, 3e-4, 0.7), joints, rng))
-    (line,) = shares.lines
+    line = min(shares.lines, key=lambda line: line.chance)
     assert {line.periods, *line.aliases} >= {200, 160}
     notice = found_in(shares, "periods-found")
     assert notice.level == "warning"

@@ -474,7 +474,7 @@ from 300 in 32 times, and 0.043 on the UR5's grid in 90 times.
 EVERY_EFFECT = """\
 Mean held-out errors [mm], medians over splits (`benchmarks/every_effect.py`); worst: of `auto` over the splits; no
 order: of `auto` where the place of a configuration in the campaign is not known; and the processor's time of `auto`, by
-that of one elastic `identify` on the same data.
+that of one elastic `identify` on the same data. The twins are of an IRB 120, with 0.02 mm of noise.
 
 | robot, training configurations | splits | geometric | elastic | auto | worst | no order | times an elastic fit |
 |---|---|---|---|---|---|---|---|"""

@@ -17,6 +17,8 @@ from truearm.calibration.calibrate import calibrate
 from truearm.engine.base.errors import Notice
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
+from truearm.engine.document.document import json_of
+from truearm.engine.document.summaries import joint_error_text, noise_blocks
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.every_effect import (
     EffectShare,
@@ -169,6 +171,19 @@ def test_shares_tell_what_the_data_know() -> None:
         assert (one.effect in fit.model.effects) == (one.moves is not None), one
     assert share(shares, "fourier").known > 23.0
     assert 4.0 < share(shares, "compliance").known < 5.05  # gravity cannot turn axis 1
+
+
+def test_each_joint_has_an_error_of_its_own_and_it_is_told() -> None:
+    _, fit, _ = plain()
+    erring = replace(fit, joint_error=np.radians([0.0, 0.002, 0.002, 0.0, 0.01, 0.0]))
+    rows = json_of(noise_blocks(erring, None))["joint_error"]
+    assert {tuple(row["joints"]): row["deviation"] for row in rows} == {
+        (1, 4, 6): 0.0,
+        (2, 3): pytest.approx(0.002),
+        (5,): pytest.approx(0.01),
+    }
+    assert joint_error_text(erring) == "up to 0.01 deg"
+    assert joint_error_text(replace(fit, joint_error=np.radians(np.full(6, 0.01)))) == "0.01 deg"
 
 
 # -- the same, however it is asked -------------------------------------------------------------------------

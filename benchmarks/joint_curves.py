@@ -1,7 +1,7 @@
 """Holds joint curves against the geometric model: on two measured robots, and on twins whose gears and encoders err.
 
-Arguments: which parts (ur5, irb120, twins; all), seeds of each (10), and `auto` for the model that the chooser finds
-too, which takes its time. Writes benchmarks/joint_curves.json, part by part. The measured data are found at
+Arguments: which parts (ur5, irb120, twins; all), seeds of each (10), and `auto` for the model with every effect
+too. Writes benchmarks/joint_curves.json, part by part. The measured data are found at
 TRUEARM_DATA.
 """
 
@@ -16,11 +16,11 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from truearm.engine.choosing.selection import select
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.document.tables import standard_error
+from truearm.engine.fit.every_effect import identify_every_effect
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import Model, named_model
 from truearm.engine.robot.chain import Array
@@ -53,15 +53,15 @@ def mean_error(fit: Fit, data: Dataset) -> tuple[float, float]:
 
 
 def judged(robot: Robot, training: Dataset, parts: dict[str, Dataset], models: dict[str, Model | None]) -> Figures:
-    """Return errors and times of some models; None is what the chooser finds."""
+    """Return errors and times of some models; None is that with every effect."""
     found: Figures = {}
     for name, model in models.items():
         if model is None and "auto" not in sys.argv[3:]:
             continue
         began = perf_counter()
-        chosen = select(robot, training).model if model is None else model
-        fit = identify(robot, training, chosen)
-        found[name] = {"seconds": perf_counter() - began, "status": fit.status.value, "effects": list(chosen.effects)}
+        fit = identify_every_effect(robot, training)[1] if model is None else identify(robot, training, model)
+        effects = list(fit.model.effects)
+        found[name] = {"seconds": perf_counter() - began, "status": fit.status.value, "effects": effects}
         found[name] |= {part: mean_error(fit, data) for part, data in parts.items()}
     return found
 

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from truearm.engine.choosing.chosen_fit import identify_chosen
-from truearm.engine.choosing.selection import select
 
 from papers import Progress
 from papers.irb120 import ELASTIC, without_beta
@@ -25,6 +23,7 @@ from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.rigid_tool import constellation
 from truearm.engine.data.statistics import Spread, errors_of, without_table_motion
 from truearm.engine.document.drawing import AFTER, BEFORE, Figure, axis, figure, rounded
+from truearm.engine.fit.every_effect import identify_every_effect
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import FRAMES, Model, named_model
 from truearm.engine.robot.library import load_robot
@@ -118,7 +117,7 @@ def study(
         progress: Called with a few words at each step.
         folder: Of the measured data.
         many: Training configurations where there are plenty.
-        searches: At how many seeds at most ``auto`` chooses a model, from 40 and from `many` configurations: it takes
+        searches: At how many seeds at most ``auto`` is fitted, from 40 and from `many` configurations: it takes
             long.
         effects: Effects that are added to the elastic model one by one; the first of `together` is among them.
         together: Effects that are added on top of each other, two at least.
@@ -134,7 +133,7 @@ def study(
     data = without_table_motion(raw)
     robot = load_robot("irb120")
     one = partial(_split, robot, raw, data, many=many, searches=searches, effects=effects, together=together)
-    tables, chosen = gathered(over_seeds(seeds, progress, one))
+    tables, moved = gathered(over_seeds(seeds, progress, one))
     tables |= _left_over(robot, data, together, min(seeds, _REMAINDERS), progress)
     means = {row.removesuffix(": mean"): values for row, values in tables["many"].items() if row.endswith(": mean")}
     usual = [f"{case.name}: {what}" for case in _cases(together) for what in ("mean", "maximum")]
@@ -153,13 +152,13 @@ def study(
         "cumulative": {name: means[name] for name in ("elastic", *several)},
         "instrument": _instrument(raw, (np.array(left_in) - elastic).tolist()),
     }
-    chose = "; ".join(words for one in chosen for words in one)
+    moving = "; ".join(words for one in moved for words in one)
     cold, warm = (float(np.median(tables["remainder"][f"{name}: mean length"])) for name in (_COLD, _WARM))
     figures = {"models": _models_figure(tables, together, many)}
     texts: dict[str, object] = {"document_count": _DOCUMENT, "many_count": many, "few_count": _FEW}
     texts |= {"auto_few": _AUTO_FEW, "best": np.median(means[several[-1]]), "warmth": cold - warm}
     texts |= {"left_in": np.median(left_in), "folds": FOLDS, "searches": searches}
-    texts |= {"chosen": f" It chose {chose}." if chose else ""}
+    texts |= {"moved": f" Its effects move the targets by so much [mm]: {moving}." if moving else ""}
     return told(__file__, seeds, every, figures, texts, why={"gains": gains})
 
 
@@ -198,7 +197,7 @@ def _split(
     effects: tuple[str, ...],
     together: tuple[str, ...],
 ) -> tuple[Figures, list[str]]:
-    """Return errors on held-out configurations of one split [mm], and what `auto` chose."""
+    """Return errors on held-out configurations of one split [mm], and what the effects of `auto` do."""
     order = seed.generator().permutation(data.configurations)
     usual = _cases(together)
     further = [_with(effect) for effect in effects]
@@ -218,17 +217,18 @@ def _split(
         "motion": {"left in": _held_out(_PLAIN.of(robot), raw, order, many, ELASTIC).mean},
         "automatic": {},
     }
-    chosen = []
+    moved = []
     for count, most in zip((_AUTO_FEW, many), searches, strict=True):
         if seed.number < most:
-            seed.step(f"auto chooses from {count} configurations")
+            seed.step(f"auto from {count} configurations")
             start = _PLAIN.of(robot)
             training, rest = (data.of_configurations(part) for part in (order[:count], order[count:]))
-            choice, fit = identify_chosen(start, training, select(start, training, seed=seed.number))
+            _, fit, shares = identify_every_effect(start, training, seed=seed.number)
             errors = Spread.of(errors_of(fit.robot, rest).position_norms * 1e3)
             figures["automatic"] |= _mean_and_maximum(f"{count} configurations", errors)
-            chosen.append(f"{', '.join(choice.model.effects)} ({count} configurations, seed {seed.number})")
-    return figures, chosen
+            moving = ", ".join(f"{one.effect} {1e3 * (one.moves or 0.0):.3f}" for one in shares.effects if one.taken)
+            moved.append(f"{moving} ({count} configurations, seed {seed.number})")
+    return figures, moved
 
 
 def _mean_and_maximum(name: str, errors: Spread) -> dict[str, float]:

@@ -103,28 +103,28 @@ def test_every_model_with_joint_effects(truearm: Truearm, data: Path, tmp_path: 
         assert again["max"] == pytest.approx(max(part["max"] for part, _ in parts), rel=1e-9), redundancy
 
 
-def test_auto_tells_how_it_chose(truearm: Truearm, data: Path, tmp_path: Path) -> None:
+def test_auto_tells_what_every_effect_does(truearm: Truearm, data: Path, tmp_path: Path) -> None:
     run = truearm("calibrate", "irb120", data, "--model", "auto", "--payload", PAYLOAD, "--out", tmp_path)
     assert run.code == 0, run.err
     outcome = result(tmp_path)
-    chosen, way = outcome["model"], outcome["selection"]
-    assert chosen["name"] == "auto"
-    added = [name for name in chosen["effects"] if name != "compliance"]
-    assert f"Chosen model: elastic, and what cross-validation added: {', '.join(added) or 'nothing'}\n" in run.out
-    figures, rows = ("geometric_mm", "elastic_mm", "error_mm"), ("candidates", "confirmations", "lines", "passed_over")
-    assert list(way) == [*figures, "layout", "blocks", *rows]
-    assert list(way["candidates"][0]) == ["effect", "taken", "gain_mm", "standard_error_mm", "reason"]
-    assert {candidate["effect"] for candidate in way["candidates"] if candidate["taken"]} == set(chosen["effects"])
-    assert all(bool(candidate["reason"]) is not candidate["taken"] for candidate in way["candidates"])
-    assert (way["layout"], way["blocks"]) == ("scattered", 0)
-    assert 0.01 < way["error_mm"] <= way["elastic_mm"] < 0.1 < way["geometric_mm"]
+    model, shares = outcome["model"], outcome["selection"]
+    assert model["name"] == "auto"
+    assert list(shares) == ["candidates", "lines"]
+    rows = shares["candidates"]
+    assert list(rows[0]) == ["effect", "taken", "moves_mm", "known", "parameters", "reason"]
+    assert {row["effect"] for row in rows if row["moves_mm"] is not None} == set(model["effects"])
+    assert all(bool(row["reason"]) is (row["moves_mm"] is None) for row in rows)
+    moving = [f"{row['effect']} {row['moves_mm']:.3f} mm" for row in rows if row["taken"]]
+    assert f"Effects (root mean square at the targets): {', '.join(moving)}\n" in run.out
+    assert (rows[0]["effect"], rows[0]["moves_mm"] > 0.5) == ("compliance", True)
+    assert outcome["validation"]["position_mm"]["mean"] < 0.08
     assert outcome["command"].endswith(f"data.csv --model auto --payload {PAYLOAD} --out DIR")
     report = (tmp_path / "report.html").read_text()
-    for tried in way["candidates"]:
-        gain = "–" if tried["gain_mm"] is None else f"{tried['gain_mm']:+.4f}"
-        assert f'<td>{tried["effect"]}</td><td class="n">{gain}</td>' in report
+    for row in rows:
+        moves = "–" if row["moves_mm"] is None else f"{row['moves_mm']:.4f}"
+        assert f'<td>{row["effect"]}</td><td class="n">{moves}</td>' in report
     payload = "Payload</dt><dd>2.7 kg at (50, 25, 100) mm"
-    for words in ("How the model was chosen", 'id="candidates"', payload):
+    for words in ("What every effect does", 'id="shares"', payload):
         assert words in report
     assert "Free fall" not in report
 
@@ -231,8 +231,11 @@ def test_what_a_model_needs_of_the_data_is_said(truearm: Truearm, data: Path, tm
         message = refused(truearm, "calibrate", "irb120", named, "--model", "full", *out)
         assert "the effect approach needs the order in which the configurations were measured" in message
         assert "got 'configurations that are not numbered'. Number the configurations 1, 2, 3" in message
-    message = refused(truearm, "calibrate", "irb120", data, "--model", "auto", "--train", 9, *out)
-    assert "too few training configurations to choose a model by cross-validation; got 9; allowed: at leas" in message
+    for redundancy in ("drop", "none"):
+        words = ("--model", "auto", "--redundancy", redundancy)
+        message = refused(truearm, "calibrate", "irb120", data, *words, *out)
+        assert "the data tell how large joint effects are, which needs priors" in message
+        assert "Leave out --redundancy, or name a model" in message
 
 
 def test_a_robot_calibrated_with_its_temperature_asks_for_it(truearm: Truearm, data: Path, tmp_path: Path) -> None:
@@ -261,7 +264,7 @@ def test_an_effect_can_be_added_to_any_model(truearm: Truearm, data: Path, tmp_p
     assert "--effect bearing-compliance" in outcome["command"]
     misspelt = refused(truearm, *arguments, "elastic", "--effect", "bearing-complience")
     assert "Did you mean bearing-compliance" in misspelt
-    assert "chooses its effects itself" in refused(truearm, *arguments, "auto", "--effect", "fourier")
+    assert "the model auto has every joint effect" in refused(truearm, *arguments, "auto", "--effect", "fourier")
     twice = refused(truearm, *arguments, "tilting", "--effect", "clearance-linear-contact")
     assert "two joint effects of the robot have the same parameter" in twice
     assert "clearance, clearance-linear-contact" in twice

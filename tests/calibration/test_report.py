@@ -16,10 +16,8 @@ from typing import Any, Final
 import numpy as np
 import pytest
 from tests.expecting import known
-from truearm.engine.choosing.search import Gain
-from truearm.engine.choosing.selection import Candidate, Selection
 
-from truearm.calibration.figures import candidates_figure, candidates_table, choice_sentence, curve_figure, curves_table
+from truearm.calibration.figures import curve_figure, curves_table, shares_figure, shares_table
 from truearm.calibration.report import Report, report_html
 from truearm.calibration.result import Calibration
 from truearm.engine.base.errors import Notice
@@ -29,6 +27,7 @@ from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.document.drawing import DARK, deserved, logarithmic_axis, significant, student_975
 from truearm.engine.document.page import json_for_script
+from truearm.engine.fit.every_effect import EffectShare, Shares
 from truearm.engine.fit.fit import Fit, identify, place
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import named_model
@@ -564,37 +563,39 @@ def test_the_report_shows_each_curve_and_not_its_hundreds_of_numbers() -> None:
     assert len(run.plot(f"joint-curve-{run.curves[0].number}").data) == 4
 
 
-# -- how the model was chosen ------------------------------------------------------------------------------
+# -- what every effect does --------------------------------------------------------------------------------
 
 
-def selection() -> Selection:
-    """Return a choice in which one effect gains two hundred times as much as another."""
+def shares() -> Shares:
+    """Return effects of which one moves the targets two hundred times as far as another."""
     rows = (
-        Candidate("joint-curve", True, Gain(4e-5, 2e-6)),
-        Candidate("backlash", True, Gain(2e-7, 1e-7)),
-        Candidate("clearance", False, Gain(-6e-7, 3e-7), "it makes held-out errors larger"),
-        Candidate("thermal-growth", False, None, "no temperature was recorded"),
+        EffectShare("joint-curve", 4e-5, 11.26, 14),
+        EffectShare("backlash", 2e-7, 2.0, 6),
+        EffectShare("clearance", 0.0, 5.9, 6),
+        EffectShare("thermal-growth", None, 0.0, 0, "no temperature was recorded"),
     )
-    return Selection(named_model("elastic"), "scattered", 0, 1e-4, None, 5e-5, rows)
+    return Shares(rows)
 
 
-def test_small_gains_are_seen_beside_a_large_one() -> None:
-    drawn = candidates_figure(selection())
-    taken, left_out = drawn["data"]
-    lengths = dict(zip(taken["y"], taken["x"], strict=True))
-    assert 0.1 < lengths["backlash"] / lengths["joint-curve"] < 0.5
-    assert left_out["x"][0] < 0.0
-    assert left_out["customdata"] == [-0.0006]
-    gains = ["-0.0006 ± 0.0003", "+0.0002 ± 0.0001", "+0.0400 ± 0.0020"]
-    assert [note["text"] for note in drawn["layout"]["annotations"]] == gains
+def test_small_moves_are_seen_beside_a_large_one() -> None:
+    drawn = shares_figure(shares())
+    (bars,) = drawn["data"]
+    lengths = dict(zip(bars["y"], bars["x"], strict=True))
+    assert list(lengths) == ["clearance", "backlash", "joint-curve"]
+    assert lengths["clearance"] == 0.0
+    assert 0.02 < lengths["backlash"] / lengths["joint-curve"] < 0.5
+    assert bars["customdata"] == [0.0, 0.0002, 0.04]
     layout = drawn["layout"]["xaxis"]
     places = dict(zip(layout["ticktext"], layout["tickvals"], strict=True))
     assert places["0"] == 0.0
     assert places["0.01"] > places["0.001"] > 0.0
-    low, high = layout["range"]
-    assert all(low <= place <= high for place in layout["tickvals"])
     assert np.all(np.diff(layout["tickvals"]) > 0.0)
-    row, *_, untried = (tuple(each) for each in candidates_table(selection()).rows)
-    assert row == ("joint-curve", "+0.0400", "0.0020", "taken")
-    assert untried == ("thermal-growth", "–", "–", "left out: no temperature was recorded")
-    assert choice_sentence(selection()).endswith("believe the held-out one.")
+
+
+def test_a_row_says_what_an_effect_does_or_why_it_is_left_out() -> None:
+    table = shares_table(shares())
+    first, second, _, untold = (tuple(each) for each in table.rows)
+    assert first == ("joint-curve", "0.0400", "11.3 of 14", "")
+    assert second == ("backlash", "0.0002", "2.0 of 6", "")
+    assert untold == ("thermal-growth", "–", "–", "no temperature was recorded")
+    assert table.marks == ("taken", "", "", "")  # a micrometre is next to nothing

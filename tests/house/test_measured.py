@@ -157,12 +157,12 @@ def test_the_arm_warmed_up_during_the_campaign(irb120: Dataset) -> None:
     assert np.median(held_out) <= 0.055
 
 
-def test_the_chosen_model_on_the_irb120(irb120: Dataset, fitted: Run) -> None:
+def test_every_effect_on_the_irb120(irb120: Dataset, fitted: Run) -> None:
     auto = calibrate("irb120", irb120, model="auto", payload=PAYLOAD, train=40)
     assert mean_mm(auto) <= fitted("elastic", 40, 0, PAYLOAD).mm.mean()
-    assert auto.selection is not None
-    taken = [one.effect for one in auto.selection.candidates if one.taken]
-    assert set(auto.fit.model.effects) == set(taken)
+    assert auto.shares is not None
+    moving = {one.effect for one in auto.shares.effects if one.taken}
+    assert {"compliance", "warm-up", "transmission-error"} <= moving <= set(auto.fit.model.effects)
     assert mean_mm(auto) <= 0.070
 
 

@@ -357,7 +357,7 @@ def test_numbers_of_periods_are_refused_in_python_as_in_files() -> None:
     assert replace(joint, transmission_periods=[100, 300]) == replace(joint, transmission_periods=(100, 300))
     wrong: tuple[Any, ...] = (0, 10_001, 10**5000, True, "100", 1.5, (100, 100), [300, None], tuple(range(1, 22)))
     for periods in wrong:
-        with refused("each number once", "from 1 to 10000", parameter="transmission_periods"):
+        with refusing("each number once", "from 1 to 10000", parameter="transmission_periods"):
             replace(joint, transmission_periods=periods)
 
 

@@ -23,8 +23,8 @@ _SAME_LENGTH: Final = 1e-5
 JUDGED_IN_PART: Final = Rule(
     "judged-in-part",
     "note",
-    "the data are large: a part of them, evenly spaced, was compared with the robot, is what the fit was judged by, or "
-    "is what `auto` chose the model by; the [limit](data.md#limits) of derivatives says how large",
+    "the data are large: a part of them, evenly spaced, was compared with the robot, or is what the fit was judged by; "
+    "the [limit](data.md#limits) of derivatives says how large",
 )
 DUPLICATES: Final = Rule("duplicates", "warning", "readings that repeat another one to the last digit", gravity=2)
 

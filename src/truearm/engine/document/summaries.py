@@ -102,21 +102,24 @@ def joint_error_text(fit: Fit) -> str:
     for joint, error in zip(fit.robot.joints, fit.joint_error.tolist(), strict=True):
         if error > 0.0:
             by_unit.setdefault("deg" if joint.kind == "revolute" else "mm", []).append(error)
-    shown = [f"{from_si(max(errors), unit):.2g} {unit}" for unit, errors in by_unit.items()]
+    shown = [
+        f"{'up to ' if min(errors) < max(errors) else ''}{from_si(max(errors), unit):.2g} {unit}"
+        for unit, errors in by_unit.items()
+    ]
     return " and ".join(shown)
 
 
 def noise_blocks(fit: Fit, again: Repeatability | None) -> Iterator[Block]:
     """Give deviations of readings, what those of a configuration share, and how well the robot comes back.
 
-    In mm, mrad and deg. The deviation of joints is one for all of a kind, as it is estimated.
+    In mm, mrad and deg. The deviation of joints is one for all of a kind, or one for each, as it is estimated.
     """
     shared = joint_error_text(fit)
     words = f"errors of the joints of {shared}, repeatability plus what the model leaves"
     units = {observation.name: observation.unit for observation in OBSERVATIONS}
-    of_kind: dict[str, list[int]] = {}
-    for number, joint in enumerate(fit.robot.joints, 1):
-        of_kind.setdefault(joint.kind, []).append(number)
+    alike: dict[tuple[str, float], list[int]] = {}
+    for number, (joint, error) in enumerate(zip(fit.robot.joints, fit.joint_error.tolist(), strict=True), 1):
+        alike.setdefault((joint.kind, error), []).append(number)
     yield detail(
         *([f"Shared by the readings of a configuration: {words}"] if shared else []),
         sigma={f"{name}_{'mm' if units[name] == 'm' else 'mrad'}": value * 1e3 for name, value in fit.sigma.items()},
@@ -127,9 +130,9 @@ def noise_blocks(fit: Fit, again: Repeatability | None) -> Iterator[Block]:
                 "kind": kind,
                 "joints": joints,
                 "unit": (unit := "deg" if kind == "revolute" else "mm"),
-                "deviation": from_si(float(fit.joint_error[joints[0] - 1]), unit),
+                "deviation": from_si(error, unit),
             }
-            for kind, joints in of_kind.items()
+            for (kind, error), joints in alike.items()
         ],
         scattered=fit.scattered,
     )

@@ -29,7 +29,7 @@ from truearm.engine.fit.problem import (
     in_words,
     unobservable_parameters,
 )
-from truearm.engine.fit.relevance import expected_sizes, variances_beforehand
+from truearm.engine.fit.relevance import expected_sizes
 from truearm.engine.fit.rounds import (
     Redundant,
     Solved,
@@ -409,13 +409,12 @@ def _worth(
         )
         joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
         alone = parts[0] if scattered or draws is not None else None
-        unfitted, parts = parts_with_curves(
+        unfitted, parts, told = parts_with_curves(
             at_solution, solved.curves, joints, solution.weight, at_bound, alone, partial(expected_sizes, solved.sizes)
         )
         covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
-        beforehand = np.array([solved.start.parameters[name].prior for name in free.names]) ** 2
-        beforehand *= variances_beforehand(solved.sizes, free.names)
-        informed = np.clip(1.0 - np.diag(covariance) / beforehand, 0.0, 1.0)
+        if solved.sizes:
+            informed = np.clip(told[: len(x)], 0.0, 1.0)
     return covariance, parts, informed, unfitted
 
 

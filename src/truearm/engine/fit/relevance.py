@@ -213,13 +213,6 @@ def expected_sizes(sizes: Sizes, of: CurveMoments, curves: Array, names: Sequenc
     return expected
 
 
-def variances_beforehand(sizes: Sizes, names: Sequence[str]) -> Array:
-    """Return what the variance of each parameter is expected to be without readings, by its prior's, ``(names,)``."""
-    tried = _tried(1.0)
-    of_group = [float(tried @ (believed := _believed(tried, scale)) / believed.sum()) ** 2 for scale in sizes.scale]
-    return np.array([of_group[sizes.place[name]] if name in sizes.place else 1.0 for name in names])
-
-
 def _tried(most: float) -> Array:
     return np.geomspace(_LEAST, most, _LEVELS)
 

@@ -374,6 +374,8 @@ def _solve_in_rounds(
         if curves.rounds and (number >= _ROUNDS_OF_SIZES or not sizes):
             next_problem, curves, joints = with_stiffness(next_problem, every.free, curves, joints, solution.weight)
             limits, change = _within(within, every.free, next_problem.free), np.inf
+        elif curves.rounds:
+            change = np.inf  # they join in before it ends
         if change < _SETTLED and _load_shift(problem, next_problem) < _LOADS_AGREE * step:
             if step == small:
                 break

@@ -1,7 +1,7 @@
-"""What `auto` chooses, how well that predicts, and how long it takes: the measured IRB 120 and UR5, over ten seeds.
+"""What `auto` finds, how well that predicts, and how long it takes: twins, and the measured IRB 120 and UR5.
 
-The time is that of the choice and of the fit of what was chosen, over that of one elastic fit to the same data, in one
-process. Argument: seeds (10). Writes benchmarks/choosing.json. The measured data are found at TRUEARM_DATA.
+The time is that of the model with every effect, over that of one elastic fit to the same data, in one process.
+Argument: seeds (10). Writes benchmarks/every_effect.json. The measured data are found at TRUEARM_DATA.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from truearm.engine.choosing.chosen_fit import identify_chosen
-from truearm.engine.choosing.selection import select
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.every_effect import identify_every_effect
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
+from truearm.engine.twin.truths import truth_twin
+from truearm.engine.twin.twin import measure
+from truearm.engine.twin.twin_joint import JointTruth
 from truearm.importing.files import read_matrices
 
 DATA = Path(os.environ.get("TRUEARM_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -46,6 +48,15 @@ def ur5(name: str) -> Dataset:
     return Dataset.of(np.radians(rows[:, 7:13]), reached, order=np.arange(len(rows)))
 
 
+def twin(backlash: float, *, one_target: bool) -> Dataset:
+    """Return readings of a twin of the IRB 120 whose joints bend, and have backlash [rad] at joints 2 and 3."""
+    robot, rng = load_robot("irb120").with_payload(PAYLOAD), np.random.default_rng(0)
+    soft = {2: JointTruth(3e-5, backlash=backlash), 3: JointTruth(1.3e-4, backlash=backlash), 5: JointTruth(4e-4)}
+    true = replace(truth_twin(robot, "random", rng), joints=soft)
+    data = measure(true, robot.random_configurations(400, rng), 2e-5, rng)
+    return replace(data.of_readings(data.target == 0), targets=data.targets[:1]) if one_target else data
+
+
 def mean_mm(robot: Robot, data: Dataset) -> float:
     """Return the mean error [mm]."""
     return 1e3 * float(errors_of(robot, data).position_norms.mean())
@@ -63,15 +74,13 @@ def one(robot: Robot, data: Dataset, count: int, seed: int, elsewhere: Dataset |
     training, rest = data.of_configurations(order[:count]), data.of_configurations(order[count:])
     identify(robot, training, named_model("geometric"))
     elastic, of_elastic = timed(lambda: identify(robot, training, named_model("elastic")))
-    (choice, fit), of_auto = timed(
-        lambda: identify_chosen(robot, training, select(robot, training, seed=seed), seed=seed)
-    )
+    (_, fit, shares), of_auto = timed(lambda: identify_every_effect(robot, training, seed=seed))
     geometric = identify(robot, training, named_model("geometric"))
     found: dict[str, Any] = {
         "seed": seed,
-        "effects": list(choice.model.effects),
+        "moves": {one.effect: 1e3 * (one.moves or 0.0) for one in shares.effects if one.taken},
         "status": fit.status.value,
-        "lines": [[line.joint, line.periods] for line in choice.lines],
+        "lines": [[line.joint, line.periods] for line in shares.lines],
         "seconds": of_auto,
         "ratio": of_auto / of_elastic,
     }
@@ -91,7 +100,13 @@ def main() -> None:
     seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     robot, arm = load_robot("irb120").with_payload(PAYLOAD), load_robot("ur5")
     unknown = replace(robot, joints=tuple(replace(joint, transmission_periods=None) for joint in robot.joints))
-    cases = {
+    twins = {
+        f"twin that {what}, {count}, {targets}": (robot, twin(play, one_target=targets == "one target"), count, None)
+        for what, play in (("bends", 0.0), ("bends and has backlash", 3e-4))
+        for count, targets in ((12, "one target"), (20, "one target"), (20, "three targets"), (30, "one target"))
+    }
+    cases: dict[str, tuple[Robot, Dataset, int, Dataset | None]] = {
+        **twins,
         "IRB 120, 20": (robot, irb120(), 20, None),
         "IRB 120, 30": (robot, irb120(), 30, None),
         "UR5, 20 of the grid": (arm, ur5("grid"), 20, None),

@@ -130,4 +130,3 @@ def test_of_a_group_that_the_data_do_not_show_is_expected_what_was_believed() ->
     assert np.ptp(found[seen]) == 0.0
     assert 0.5 < found[seen[0]] < 30.0  # ones of a deviation of 0.2 make 25
     assert expected_sizes(NO_SIZES, equations(columns, columns @ np.ones(6)), np.zeros(0), NAMES).tolist() == [1.0] * 6
-

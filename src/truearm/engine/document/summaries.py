@@ -18,6 +18,8 @@ from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.refit import Refit
 from truearm.engine.robot.parts import Payload
 
+#: Effects that are named, the largest first.
+_LARGEST_SHARES: Final = 4
 #: What deviations of a bootstrap follow from, after their number.
 BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 
@@ -25,8 +27,9 @@ BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 def shares_block(shares: Shares) -> Block:
     """Return what every effect does: by how much it moves the targets, in mm."""
     moving = [share for share in shares.effects if share.taken]
-    words = [f"{share.effect} {(share.moves or 0.0) * 1e3:.3f} mm" for share in moving]
-    text = f"Effects (root mean square at the targets): {', '.join(words) or 'none that moves them'}"
+    largest = ", ".join(f"{share.effect} {(share.moves or 0.0) * 1e3:.3f}" for share in moving[:_LARGEST_SHARES])
+    more = len(moving) - _LARGEST_SHARES
+    text = f"Effects that move the targets [mm]: {largest or 'none'}{f', and {more} smaller' if more > 0 else ''}"
     figures = {
         "candidates": [
             {

@@ -381,7 +381,7 @@ def expected_variances(of: CurveMoments, likeliest: Array) -> Array:
 
 def curve_covariance(
     of: CurveMoments, variance: Array, certain: NDArray[np.bool_], expected: Array
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Return the mean squared error of the fitted values, its part without readings, and which coefficients matter.
 
     Args:
@@ -392,6 +392,7 @@ def curve_covariance(
     Returns:
         whole, beforehand: ``(parameters, parameters)`` each: the others per prior, coefficients in rad. The second is
             what priors leave, without the noise of the readings.
+        informed: Share of the expected variance of each that the readings removed, ``(parameters,)``.
     """
     expected = np.concatenate([expected, np.maximum(variance, _CERTAIN)])
     root = np.where(certain, 0.0, np.sqrt(expected))
@@ -401,7 +402,7 @@ def curve_covariance(
     off = np.where(certain, 0.0, of.away - mean)
     missing = np.outer(off, off)
     whole = root[:, None] * C * root
-    return whole + missing, root[:, None] * (C @ C) * root + missing
+    return whole + missing, root[:, None] * (C @ C) * root + missing, 1.0 - np.diag(C)
 
 
 def that_matter(of: CurveMoments, variance: Array) -> NDArray[np.bool_]:
@@ -507,6 +508,16 @@ class Curves:
     def names(self) -> tuple[str, ...]:
         """Names of all coefficients."""
         return tuple(self.places)
+
+    def known_of(self, free: FreeParameters) -> FreeParameters:
+        """Return free parameters without the coefficients that were not found, the others as large as was found."""
+        return FreeParameters(
+            tuple(
+                replace(p, prior=math.sqrt(self.variances[p.name])) if p.name in self.variances else p
+                for p in free.parameters
+                if p.name not in self.places or p.name in self.variances
+            )
+        )
 
     def priors_of(self, robot: Robot) -> list[Parameter]:
         """Return a robot's coefficients with what is expected of them."""
@@ -622,7 +633,7 @@ def parts_with_curves(
     certain: NDArray[np.bool_],
     scatter: CovariancePart | None,
     expected_of: Callable[[CurveMoments, Array, Sequence[str]], Array],
-) -> tuple[tuple[str, ...], tuple[CovariancePart, ...]]:
+) -> tuple[tuple[str, ...], tuple[CovariancePart, ...], Array]:
     """Return what the parameters of a fit with curves are off by, and the coefficients that were not fitted.
 
     Args:
@@ -637,6 +648,7 @@ def parts_with_curves(
     Returns:
         names, parts: Of the coefficients that are zero in the fit and may not be, and the parts of the covariance [SI]
             of the free parameters and, behind them, of these.
+        informed: Share of the expected variance of each that the readings removed.
     """
     names, free = list(curves.places), problem.free
     of = curve_moments(problem, curves, joints, weight, 1.0 if scatter is None else curves.design_effect)
@@ -646,7 +658,7 @@ def parts_with_curves(
     sure = np.zeros(len(place), dtype=bool)
     sure[[place[name] for name, is_certain in zip(free.names, certain.tolist(), strict=True) if is_certain]] = True
     expected = expected_of(of, variance, [p.name for p in others])
-    whole, beforehand = curve_covariance(of, variance, sure, expected)
+    whole, beforehand, informed = curve_covariance(of, variance, sure, expected)
     fitted = set(free.names)
     more = [name for name, on in zip(names, that_matter(of, variance).tolist(), strict=True) if on] if names else []
     more = [name for name in more if name not in fitted]
@@ -654,9 +666,9 @@ def parts_with_curves(
     size = np.concatenate([[p.prior for p in others], np.ones(len(names))])[order]
     if scatter is None:
         parts = [CovariancePart(whole[np.ix_(order, order)], _FREEDOM, tuple(np.flatnonzero(joints).tolist()))]
-        return tuple(more), tuple(part.scaled(size) for part in parts)
+        return tuple(more), tuple(part.scaled(size) for part in parts), informed[order]
     known = CovariancePart(beforehand[np.ix_(order, order)], _FREEDOM).scaled(size)
-    return tuple(more), (scatter.among(np.arange(len(order)) < len(free.names)), known)
+    return tuple(more), (scatter.among(np.arange(len(order)) < len(free.names)), known), informed[order]
 
 
 #: Of a model without any.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -15,12 +16,12 @@ import numpy as np
 from truearm.engine.base.errors import InputError, Notice, Rule, listed
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.bounds import Bounds
-from truearm.engine.fit.fit import Fit, identify
+from truearm.engine.fit.fit import Fit, fit_of, refit_draws
 from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import Model, named_model
-from truearm.engine.fit.rounds import Redundant
-from truearm.engine.fit.transmission import LARGEST_CHANCE, PeriodicError, periodic_errors
+from truearm.engine.fit.rounds import Redundant, Solved, evaluated, factors_of, find_parameters, informed_rows
+from truearm.engine.fit.transmission import LARGEST_CHANCE, PeriodicError, lines_of, pulls_of
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.effects.balancing import Balancing
@@ -37,8 +38,8 @@ _ASKED_FOR: Final = frozenset({LinearContactClearance.name})
 _LINES: Final = 8
 #: How many lines as strong as the weakest chance would show: those that are not there shrink as all else does.
 _CHANCE: Final = 1.0
-#: Fits at most, each with the periodic errors that the one before left.
-_FITS: Final = 3
+#: How often they are looked for at most, each time in what the fit before left.
+_SEARCHES: Final = 2
 #: What an effect moves the targets by, a root mean square, from which it is counted [m].
 MATTERS: Final = 1e-6
 
@@ -134,28 +135,39 @@ def identify_every_effect(
         fit: Of it.
         shares: What every effect does.
     """
+    progress(f"identifying every joint effect on {data.configurations} configurations")
     lines: tuple[PeriodicError, ...] = ()
-    for _ in range(_FITS):
-        model = every_effect(robot, data)
-        progress(f"identifying every joint effect on {data.configurations} configurations")
-        fit = identify(
-            robot,
-            data,
-            model,
-            loss=loss,
-            redundancy=redundancy,
-            bounds=bounds,
-            bounds_file=bounds_file,
-            fixed=fixed,
-            bootstrap=bootstrap,
-            seed=seed,
-            progress=progress,
-        )
-        more = periodic_errors(fit, data, _LINES, _CHANCE)
+    find = partial(
+        find_parameters,
+        data=data,
+        loss=loss,
+        redundancy=redundancy,
+        bounds=bounds,
+        bounds_file=bounds_file,
+        fixed=fixed,
+    )
+    solved = find(robot, model=every_effect(robot, data))
+    for _ in range(_SEARCHES):
+        more = _lines_left(solved)
         if not more:
             break
-        robot, lines = with_lines(robot, more), (*lines, *more)
+        lines, robot = (*lines, *more), with_lines(robot, more)
+        progress("identifying errors that repeat with the joints' angles")
+        solved = find(with_lines(solved.start, more), model=every_effect(robot, data), near=solved)
+    draws = refit_draws(solved, loss, bootstrap, seed, progress) if bootstrap else None
+    fit = fit_of(solved, every_effect(robot, data), loss, draws)
     return robot, fit, _shares(robot, fit, data, lines)
+
+
+def _lines_left(solved: Solved) -> tuple[PeriodicError, ...]:
+    """Return the periodic errors in what a solution leaves."""
+    problem, solution = solved.problem, solved.solution
+    joint_error, larger = np.zeros(len(solved.start.joints)), None
+    if solved.components is not None:
+        likeliest = solved.components.likeliest
+        joint_error, larger = np.sqrt(likeliest.joints), np.sqrt(likeliest.factors[factors_of(problem)[1]])
+    pulls = pulls_of(evaluated(problem, solution), joint_error, informed_rows(problem, solution), larger)
+    return () if pulls is None else lines_of(solved.robot, pulls, _LINES, _CHANCE)
 
 
 def with_lines(robot: Robot, lines: Sequence[PeriodicError]) -> Robot:

@@ -29,7 +29,7 @@ from truearm.engine.fit.problem import (
     in_words,
     unobservable_parameters,
 )
-from truearm.engine.fit.relevance import expected_sizes, variances_beforehand
+from truearm.engine.fit.relevance import expected_sizes
 from truearm.engine.fit.rounds import (
     Redundant,
     Solved,
@@ -270,7 +270,7 @@ def identify(
         small=small,
     )
     draws = refit_draws(solved, loss, bootstrap, seed, progress) if bootstrap else None
-    return _fit(solved, model, loss, draws)
+    return fit_of(solved, model, loss, draws)
 
 
 def place(robot: Robot, data: Dataset, loss: Loss = "linear", fixed: FixedPlaces = NOTHING_FIXED) -> Robot:
@@ -285,7 +285,12 @@ def place(robot: Robot, data: Dataset, loss: Loss = "linear", fixed: FixedPlaces
     return find_parameters(robot, data, FRAMES, loss=loss, fixed=fixed, shared=False).robot
 
 
-def _fit(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -> Fit:
+def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None) -> Fit:
+    """Return a fit from its solution: what the values that were found are worth.
+
+    Args:
+        draws: Values of the free parameters from data that were drawn anew, ``(draws, parameters)``.
+    """
     problem, solution, start, limits = solved.problem, solved.solution, solved.start, solved.limits
     free, x = problem.free, solution.vector
     at_bound = bound_by(solution, free, limits)
@@ -404,13 +409,12 @@ def _worth(
         )
         joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
         alone = parts[0] if scattered or draws is not None else None
-        unfitted, parts = parts_with_curves(
+        unfitted, parts, told = parts_with_curves(
             at_solution, solved.curves, joints, solution.weight, at_bound, alone, partial(expected_sizes, solved.sizes)
         )
         covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
-        beforehand = np.array([solved.start.parameters[name].prior for name in free.names]) ** 2
-        beforehand *= variances_beforehand(solved.sizes, free.names)
-        informed = np.clip(1.0 - np.diag(covariance) / beforehand, 0.0, 1.0)
+        if solved.sizes:
+            informed = np.clip(told[: len(x)], 0.0, 1.0)
     return covariance, parts, informed, unfitted
 
 

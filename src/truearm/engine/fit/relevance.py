@@ -34,7 +34,6 @@ _SPARSE: Final = 2.0
 #: Information of the readings on a group that is none, and what its variance is then multiplied by in a step.
 _NOTHING: Final = 0.02
 _FADING: Final = 0.3
-_MATTERS: Final = 0.1  # what the data know of a group whose size has to settle
 #: Deviation of a group by the prior of its parameters: at least and at most.
 _LEAST: Final = 1e-3
 _MOST: Final = 3.0
@@ -113,8 +112,8 @@ def with_sizes(
         start = np.maximum(sizes.deviation, 3.0 * _LEAST)
     deviation, known, noise = _climbed(left, of.rows, group, count, start, sizes.scale, not _declared(problem))
     before = sizes.deviation if len(sizes.deviation) else deviation
-    matters = known > _MATTERS
-    change = float(np.abs(np.log(deviation / before))[matters].max(initial=0.0)) if len(sizes.deviation) else np.inf
+    moved = np.abs(np.log(deviation / before)) * np.minimum(known, 1.0)
+    change = float(moved.max(initial=0.0)) if len(sizes.deviation) else np.inf
     parameters = tuple(
         replace(p, prior=float(unit_of * deviation[sizes.place[p.name]])) if p.name in sizes.place else p
         for p, unit_of in zip(free.parameters, _spread(graded, unit), strict=True)
@@ -212,13 +211,6 @@ def expected_sizes(sizes: Sizes, of: CurveMoments, curves: Array, names: Sequenc
         likely = np.exp(height - height.max())
         expected[mine] = float(likely @ (tried / now) / likely.sum()) ** 2
     return expected
-
-
-def variances_beforehand(sizes: Sizes, names: Sequence[str]) -> Array:
-    """Return what the variance of each parameter is expected to be without readings, by its prior's, ``(names,)``."""
-    tried = _tried(1.0)
-    of_group = [float(tried @ (believed := _believed(tried, scale)) / believed.sum()) ** 2 for scale in sizes.scale]
-    return np.array([of_group[sizes.place[name]] if name in sizes.place else 1.0 for name in names])
 
 
 def _tried(most: float) -> Array:

@@ -59,6 +59,9 @@ _ROUNDS: Final = 6
 _SETTLED: Final = 0.02  # largest relative change of a deviation that changes nothing
 #: Information of the readings on a direction, by that of the priors, that is none.
 _UNSEEN: Final = 1e-3
+#: Relative change of the size of an effect that changes nothing, and the last step of a solution meanwhile [priors].
+_SIZES_SETTLED: Final = 0.1
+_COARSE: Final = 0.01
 #: Rounds in which the sizes of effects are found before curves of the joints join in.
 _ROUNDS_OF_SIZES: Final = 2
 _LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
@@ -109,11 +112,12 @@ def find_parameters(
 
     Args:
         shared: Whether errors of the joints that the readings of a visit share are looked for, with the linear loss.
-        near: A solution of the same robot and model from other data: the search begins at its frames, values and
-            variances. What is found does not depend on it.
+        near: A solution from the same data, of a robot that is the same but for further parameters of effects. The
+            search begins at its values and variances, and its curves keep their priors. The robot given is its start
+            with those.
     """
     robot = robot.marked(data.simulated)
-    start = start_from_readings(model.prepared(robot), data, fixed) if near is None else near.start
+    start = start_from_readings(model.prepared(robot), data, fixed) if near is None else model.prepared(robot)
     check_circumstances(start, data)
     free = fixed.free_of(unanchored(model.free(start), data), start)
     if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
@@ -143,6 +147,7 @@ def find_parameters(
             shared=shared and redundancy != "none",
             joints=joints,
             weighed=model.weighed,
+            curves=None if near is None else near.curves,
         )
         steps += solution.steps
         if redundancy != "drop":
@@ -286,6 +291,7 @@ def _solve_with_noise(
     shared: bool,
     joints: Array | None = None,
     weighed: bool = False,
+    curves: Curves | None = None,
 ) -> tuple[Solution, Problem, Components | None, Curves, Sizes]:
     """Solve; then again with what the solution says of deviations, of the joints' curves and of the loads.
 
@@ -298,7 +304,7 @@ def _solve_with_noise(
     untold: frozenset[str] = frozenset()
     while True:
         result = _solve_in_rounds(
-            problem, loss, limits, small, shared=shared, joints=joints, untold=untold, weighed=weighed
+            problem, loss, limits, small, shared=shared, joints=joints, untold=untold, weighed=weighed, curves=curves
         )
         more = _untold(result[1], result[2]) - untold
         if not more:
@@ -336,18 +342,20 @@ def _solve_in_rounds(
     shared: bool,
     joints: Array | None,
     untold: frozenset[str],
-    weighed: bool = False,
+    weighed: bool,
+    curves: Curves | None,
 ) -> tuple[Solution, Problem, Components | None, Curves, Sizes]:
     """Solve in rounds, with the deviations of what is `untold` as they are."""
     every, within = problem, limits
-    curves = Curves.none_of(problem)
+    curves = Curves.none_of(problem) if curves is None else curves
     if curves:
-        problem = replace(problem, free=problem.free.without(curves.names))
+        problem = replace(problem, free=curves.known_of(problem.free))
         limits = _within(within, every.free, problem.free)
     sizes = Sizes.none_of(problem) if weighed else NO_SIZES
     priors = priors_beforehand(every.free.parameters)
     joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
-    solution = solve_with_joints(problem, joints, loss, limits, small)
+    step = _COARSE if sizes else small
+    solution = solve_with_joints(problem, joints, loss, limits, step)
     steps = solution.steps
     components = None
     most = _ROUNDS + (curves.rounds if curves else 0) + (_ROUNDS if sizes else 0)
@@ -360,20 +368,23 @@ def _solve_in_rounds(
         values = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
         started = FreeParameters(tuple(replace(p, value=values[p.name]) for p in problem.free.parameters))
         next_problem = replace(next_problem, robot=problem.robot.with_values(values), free=started)
-        if sizes:
+        if step > small:
             next_problem, sizes, more, joints = with_sizes(next_problem, sizes, joints, solution.weight, priors)
-            change = max(change, more)
+            change = max(change, more * _SETTLED / _SIZES_SETTLED)
         if curves.rounds and (number >= _ROUNDS_OF_SIZES or not sizes):
             next_problem, curves, joints = with_stiffness(next_problem, every.free, curves, joints, solution.weight)
             limits, change = _within(within, every.free, next_problem.free), np.inf
         elif curves.rounds:
             change = np.inf  # they join in before it ends
-        if change < _SETTLED and _load_shift(problem, next_problem) < _LOADS_AGREE * small:
-            break
+        if change < _SETTLED and _load_shift(problem, next_problem) < _LOADS_AGREE * step:
+            if step == small:
+                break
+            step = small  # from here on sizes stay as they are
         if len(next_problem.free.names) > len(problem.free.names):
             components = None  # with curves it is asked again whether the joints err
         problem = next_problem
-        solution = solve_with_joints(problem, joints, loss, limits, small, curves.design_effect)
+        step = small if number == most - _ROUNDS else step
+        solution = solve_with_joints(problem, joints, loss, limits, step, curves.design_effect)
         steps += solution.steps
     return replace(solution, steps=steps), problem, components, curves, sizes
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -21,7 +21,7 @@ from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.likelihood import Visits, Whitening
-from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.problem import Evaluation, Problem
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import FreeParameters
 from truearm.engine.robot.robot import Robot
@@ -89,25 +89,40 @@ def periodic_errors(
         most: How many a joint may have, see :func:`lines_of`.
         chance: How many as strong as the weakest chance would show, at most.
     """
-    robot = fit.robot
-    if data.configurations < LEAST_CONFIGURATIONS or not data.has_position.any():
-        return ()
-    read = replace(data.of_readings(data.has_position), quaternion=None, setup=None)
-    problem = Problem(robot, read, FreeParameters(()), dict(fit.sigma))
-    here = problem.at(np.zeros(0))
-    G, r = here.by_joints, here.residual
-    if fit.joint_error.any():
-        whitening = Whitening(Visits(problem.visits), G * fit.joint_error)
+    problem = Problem(fit.robot, data, FreeParameters(()), dict(fit.sigma))
+    pulls = pulls_of(problem.at(np.zeros(0)), fit.joint_error, fit.spent)
+    return () if pulls is None else lines_of(fit.robot, pulls, most, chance)
+
+
+def pulls_of(here: Evaluation, joint_error: Array, spent: float, larger: Array | None = None) -> Pulls | None:
+    """Return what the positions of a problem say of errors of the joints; None where too few were read.
+
+    Args:
+        joint_error: Deviation of the error of each joint that the readings of a visit share [rad or m], ``(joints,)``.
+        spent: How many equations' worth of residual the fit used up.
+        larger: By how much the deviation of each equation is larger than the one that it is divided by, ``(rows,)``.
+    """
+    problem, data = here.problem, here.problem.data
+    compared = [
+        (np.arange(place.start, place.stop), np.repeat(data.configuration[block.readings], 3))
+        for block, place in problem.placed
+        if block.data is data and block.observation.name == "position"
+    ]
+    if data.configurations < LEAST_CONFIGURATIONS or not compared:
+        return None
+    rows, configuration = (np.concatenate(part) for part in zip(*compared, strict=True))
+    G, r = here.by_joints[rows], here.residual[rows]
+    if larger is not None:
+        G, r = G / larger[rows, None], r / larger[rows]
+    if joint_error.any():
+        visits = np.unique(problem.visits[rows], return_inverse=True)[1].reshape(-1)
+        whitening = Whitening(Visits(visits), G * joint_error)
         G, r = whitening.applied(G), whitening.applied(r)
-    configuration = np.concatenate(
-        [np.repeat(read.configuration[block.readings], block.observation.components) for block in problem.blocks]
-    )
-    count = len(robot.joints)
-    pull, weight = np.zeros((read.configurations, count)), np.zeros((read.configurations, count, count))
+    count = G.shape[1]
+    pull, weight = np.zeros((data.configurations, count)), np.zeros((data.configurations, count, count))
     np.add.at(pull, configuration, -G * r[:, None])
     np.add.at(weight, configuration, G[:, :, None] * G[:, None, :])
-    free = max(problem.rows - round(fit.spent), 1)
-    return lines_of(robot, Pulls(read.joints, pull, weight, float(r @ r), free), most, chance)
+    return Pulls(data.joints, pull, weight, float(r @ r), max(len(r) - round(spent), 1))
 
 
 def lines_of(

@@ -1,4 +1,4 @@
-"""Models of joints that give way: payload, mounting, the chosen model, what is refused; and a spring at joint 2."""
+"""Models of joints that give way: payload, mounting, every effect at once, refusals; and a spring at joint 2."""
 
 from __future__ import annotations
 

@@ -326,10 +326,8 @@ def plan_measurements(
     seen = model.prepared(robot)
     refuse_clearance_of(seen, constraints, place)
     fulfilled = dict(allowed(seen, candidates, constraints, place, seen_from_the_origin=seen_from_the_origin))
-    if finder is not None:
-        fulfilled |= {
-            name: keeps for name, keeps in finder.check.clear_of(candidates.joints).items() if not keeps.all()
-        }
+    clear = {} if finder is None else finder.check.clear_of(candidates.joints)
+    fulfilled |= {name: keeps for name, keeps in clear.items() if not keeps.all()}
     rejected = {name: int(np.sum(~keeps)) for name, keeps in fulfilled.items()}
     usable = np.flatnonzero(np.all(list(fulfilled.values()), axis=0))
     _refuse_too_few(poses, len(usable), len(candidates), rejected, labels is not None, drawn)

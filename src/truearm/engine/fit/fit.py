@@ -46,7 +46,7 @@ from truearm.engine.fit.rounds import (
 )
 from truearm.engine.fit.solver import SMALL, Solution
 from truearm.engine.fit.start_values import start_from_readings, unanchored
-from truearm.engine.fit.variance_components import CovariancePart, cluster_covariance, widening
+from truearm.engine.fit.variance_components import Components, CovariancePart, cluster_covariance, widening
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import SCALE, FreeParameters
 from truearm.engine.robot.robot import Robot
@@ -332,16 +332,7 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
         status = Status.AT_BOUND
     else:
         status = Status.CONVERGED
-    sigma = {}
-    names, _ = factors_of(problem)
     spent = informed_rows(problem, solution)
-    for name in noise:
-        values = np.concatenate([b.sigma for b in problem.blocks if problem.kind(b) == name])
-        sigma[name] = float(np.sqrt(np.mean(values**2)))
-        if name in declared:
-            sigma[name] /= problem.widened
-        elif components is not None:
-            sigma[name] *= float(np.sqrt(components.likeliest.factors[names.index(name)]))
     return Fit(
         robot=robot,
         start=start,
@@ -355,7 +346,7 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
         unobservable=unobservable,
         gauge_freedoms=gauge,
         unobservable_combinations=_unobservable_combinations(problem, x) if gauge else (),
-        sigma=sigma,
+        sigma={name: _sigma_of(name, problem, components, name in declared) for name in noise},
         declared=declared == set(noise),
         excess=excess,
         joint_error=joint_error,
@@ -371,6 +362,17 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
         bootstrap=0 if draws is None else len(draws),
         unfitted=unfitted,
     )
+
+
+def _sigma_of(name: str, problem: Problem, components: Components | None, is_declared: bool) -> float:
+    """Return the standard deviation of the readings of a kind, root mean square [m or rad]."""
+    values = np.concatenate([block.sigma for block in problem.blocks if problem.kind(block) == name])
+    sigma = float(np.sqrt(np.mean(values**2)))
+    if is_declared:
+        return sigma / problem.widened
+    if components is None:
+        return sigma
+    return sigma * float(np.sqrt(components.likeliest.factors[factors_of(problem)[0].index(name)]))
 
 
 def _worth(

@@ -170,7 +170,7 @@ def test_shares_tell_what_the_data_know() -> None:
         assert 0.0 <= one.known <= one.parameters + 1e-9, one
         assert (one.effect in fit.model.effects) == (one.moves is not None), one
     assert share(shares, "fourier").known < 6.0  # there is none
-    assert 4.0 < share(shares, "compliance").known < 5.05  # gravity cannot turn axis 1
+    assert 3.5 < share(shares, "compliance").known < 5.05  # gravity cannot turn axis 1
 
 
 def test_each_joint_has_an_error_of_its_own_and_it_is_told() -> None:

@@ -59,7 +59,7 @@ _ROUNDS: Final = 6
 _SETTLED: Final = 0.02  # largest relative change of a deviation that changes nothing
 #: Information of the readings on a direction, by that of the priors, that is none.
 _UNSEEN: Final = 1e-3
-#: Relative change of the size of an effect that changes nothing, and the last step of a solution meanwhile [priors].
+#: Relative change of the size of an effect that changes nothing, and the last step of solutions meanwhile [priors].
 _SIZES_SETTLED: Final = 0.1
 _COARSE: Final = 0.01
 #: Rounds in which the sizes of effects are found before curves of the joints join in.
@@ -354,8 +354,8 @@ def _solve_in_rounds(
     sizes = Sizes.none_of(problem) if weighed else NO_SIZES
     priors = priors_beforehand(every.free.parameters)
     joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
+    solution = solve_with_joints(problem, joints, loss, limits, small)
     step = _COARSE if sizes else small
-    solution = solve_with_joints(problem, joints, loss, limits, step)
     steps = solution.steps
     components = None
     most = _ROUNDS + (curves.rounds if curves else 0) + (_ROUNDS if sizes else 0)

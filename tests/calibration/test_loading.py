@@ -114,8 +114,9 @@ def test_auto_tells_what_every_effect_does(truearm: Truearm, data: Path, tmp_pat
     assert list(rows[0]) == ["effect", "taken", "moves_mm", "known", "parameters", "reason"]
     assert {row["effect"] for row in rows if row["moves_mm"] is not None} == set(model["effects"])
     assert all(bool(row["reason"]) is (row["moves_mm"] is None) for row in rows)
-    moving = [f"{row['effect']} {row['moves_mm']:.3f} mm" for row in rows if row["taken"]]
-    assert f"Effects (root mean square at the targets): {', '.join(moving)}\n" in run.out
+    moving = [f"{row['effect']} {row['moves_mm']:.3f}" for row in rows if row["taken"]]
+    more = f", and {len(moving) - 4} smaller" if len(moving) > 4 else ""
+    assert f"Effects that move the targets [mm]: {', '.join(moving[:4])}{more}\n" in run.out
     assert (rows[0]["effect"], rows[0]["moves_mm"] > 0.5) == ("compliance", True)
     assert outcome["validation"]["position_mm"]["mean"] < 0.08
     assert outcome["command"].endswith(f"data.csv --model auto --payload {PAYLOAD} --out DIR")

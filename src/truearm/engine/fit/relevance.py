@@ -94,12 +94,15 @@ def with_sizes(
     names, free = problem.free.names, problem.free
     graded = np.array([name in sizes.place for name in names])
     of = curve_moments(problem, NO_CURVES, joints, weight, 1.0)
-    order = np.concatenate([np.flatnonzero(~graded), np.flatnonzero(graded), [len(names)]])
-    moments = of.moments[np.ix_(order, order)]
+    held = np.array([name == RATE for name in names])  # by its slope it would stand in for the lengths that warm up
+    kept = np.eye(len(names) + 1)
+    kept[:-1, -1] = np.where(held, -of.away, 0.0)
+    order = np.concatenate([np.flatnonzero(~graded & ~held), np.flatnonzero(graded), [len(names)]])
+    moments = (kept.T @ of.moments @ kept)[np.ix_(order, order)]
     mine = [p for p in free.parameters if p.name in sizes.place]
     unit = np.array([priors[p.name] for p in mine])
     group = np.array([sizes.place[p.name] for p in mine])
-    left = moments_without(moments, int((~graded).sum()))
+    left = moments_without(moments, int((~graded & ~held).sum()))
     ratio = np.append(unit / np.array([p.prior for p in mine]), 1.0)
     left = left * np.outer(ratio, ratio)  # per prior beforehand
     count = len(sizes.groups)

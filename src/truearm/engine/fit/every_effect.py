@@ -42,6 +42,8 @@ _CHANCE: Final = 1.0
 _SEARCHES: Final = 2
 #: What an effect moves the targets by, a root mean square, from which it is counted [m].
 MATTERS: Final = 1e-6
+#: Likewise, from which it is said that an effect follows the order of the campaign [m].
+_WORTH_SAYING: Final = 5e-6
 
 
 @dataclass(frozen=True)
@@ -283,7 +285,7 @@ def check_shares(shares: Shares) -> list[Notice]:
     """Return what to know of a model with every effect."""
     notices = []
     of_order = {effect.name for effect in EFFECTS if effect.ordered}
-    ordered = [share.effect for share in shares.effects if share.taken and share.effect in of_order]
+    ordered = [s.effect for s in shares.effects if s.effect in of_order and (s.moves or 0.0) >= _WORTH_SAYING]
     if ordered:
         notices.append(
             ORDER_IN_THE_MODEL(

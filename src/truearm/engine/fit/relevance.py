@@ -24,8 +24,9 @@ from truearm.engine.robot.effects.warm_up import RATE
 from truearm.engine.robot.parameters import FreeParameters, Parameter
 
 # With a group of m parameters w of variance v, the data know ``g`` of them, 0 to m, so that the likelihood has its
-# maximum where ``v = w'w / g``. The deviation of a group is believed to be of a half Cauchy distribution, whose scale
-# is some times what would make the effects explain all that the arm alone leaves, each its share.
+# maximum where ``v = w'w / g``. The deviation of a group is believed to be as likely at every order of magnitude below a
+# scale, and less and less beyond, as one of a half Cauchy distribution. The scale is what would make all effects
+# together explain what the arm alone leaves, each its share.
 #
 #: Scale of the deviations of groups, by what would make all groups together explain what is left over.
 _SCALE: Final = 1.0
@@ -34,11 +35,12 @@ _SPARSE: Final = 2.0
 #: Information of the readings on a group that is none, and what its variance is then multiplied by in a step.
 _NOTHING: Final = 0.02
 _FADING: Final = 0.3
+#: Deviation from which a group starts again, at least, by what it is expected to be about.
+_AGAIN: Final = 0.1
 #: Deviation of a group by the prior of its parameters: at least and at most.
 _LEAST: Final = 1e-3
 _MOST: Final = 3.0
 _STEPS: Final = 60
-SP = 5.0
 _SETTLED: Final = 0.02
 
 
@@ -112,7 +114,7 @@ def with_sizes(
         sizes = replace(sizes, scale=np.clip(scale, _LEAST, _MOST))
         start = sizes.scale
     else:
-        start = np.maximum(sizes.deviation, 3.0 * _LEAST)
+        start = np.maximum(sizes.deviation, _AGAIN * sizes.scale)  # what was nothing may come back
     deviation, known, noise = _climbed(left, of.rows, group, count, start, sizes.scale, not _declared(problem))
     before = sizes.deviation if len(sizes.deviation) else deviation
     moved = np.abs(np.log(deviation / before)) * np.minimum(known, 1.0)

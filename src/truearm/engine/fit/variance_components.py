@@ -24,7 +24,6 @@ from truearm.engine.robot.chain import Array
 # information (Gilmour, Thompson and Cullis 1995). All it needs of the readings are products of few numbers by visit,
 # formed once.
 
-FORCE = False
 #: Twice the gain in log-likelihood from which joint errors are believed.
 _SIGNIFICANT: Final = 5.41
 _STEPS: Final = 40
@@ -121,7 +120,7 @@ def variance_components(
         believed = 2.0 * (best.likelihood - alone.likelihood) >= _SIGNIFICANT and not _alone_in(best)
         best = best if believed else alone
         likeliest = _variances(best, kinds, noise)
-        holds = FORCE or ((best is alone or _agree(alone, best)) and _independent(best))
+        holds = (best is alone or _agree(alone, best)) and _independent(best)
         best = best if holds else alone
     else:
         best = Likelihood(moments, np.where(start > least, 1.0, start), before.weighing.joints)

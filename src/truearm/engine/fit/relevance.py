@@ -24,8 +24,8 @@ from truearm.engine.robot.effects.warm_up import RATE
 from truearm.engine.robot.parameters import FreeParameters, Parameter
 
 # With a group of m parameters w of variance v, the data know ``g`` of them, 0 to m, so that the likelihood has its
-# maximum where ``v = w'w / g``. The deviation of a group is believed to be as likely at every order of magnitude below a
-# scale, and less and less beyond, as one of a half Cauchy distribution. The scale is what would make all effects
+# maximum where ``v = w'w / g``. The deviation of a group is believed to be as likely at every order of magnitude below
+# a scale, and less and less beyond, as one of a half Cauchy distribution. The scale is what would make all effects
 # together explain what the arm alone leaves, each its share.
 #
 #: Scale of the deviations of groups, by what would make all groups together explain what is left over.

@@ -32,7 +32,9 @@ def climbed(
     columns: Array, right: Array, groups: list[int], scale: list[float], *, noisy: bool = False
 ) -> tuple[Array, Array, float]:
     scales = np.array(scale)
-    return _climbed(moments_of(columns, right), float(len(right)), np.array(groups), len(scale), scales, scales, noisy)
+    return _climbed(
+        moments_of(columns, right), float(len(right)), np.array(groups), len(scale), scales, scales, noisy=noisy
+    )
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.effects.warm_up import RATE
-from truearm.engine.robot.parameters import FreeParameters, Parameter
+from truearm.engine.robot.parameters import FreeParameters
 
 # With a group of m parameters w of variance v, the data know ``g`` of them, 0 to m, so that the likelihood has its
 # maximum where ``v = w'w / g``. The deviation of a group is believed to be as likely at every order of magnitude below
@@ -93,58 +93,54 @@ def with_sizes(
         problem, sizes, change: The largest relative change of a deviation that matters.
         joints: Their variances with the effects.
     """
-    names, free = problem.free.names, problem.free
-    graded = np.array([name in sizes.place for name in names])
-    of = curve_moments(problem, NO_CURVES, joints, weight, 1.0)
-    held = np.array([name == RATE for name in names])  # by its slope it would stand in for the lengths that warm up
-    kept = np.eye(len(names) + 1)
-    kept[:-1, -1] = np.where(held, -of.away, 0.0)
-    order = np.concatenate([np.flatnonzero(~graded & ~held), np.flatnonzero(graded), [len(names)]])
-    moments = (kept.T @ of.moments @ kept)[np.ix_(order, order)]
-    mine = [p for p in free.parameters if p.name in sizes.place]
-    unit = np.array([priors[p.name] for p in mine])
-    group = np.array([sizes.place[p.name] for p in mine])
-    left = moments_without(moments, int((~graded & ~held).sum()))
-    ratio = np.append(unit / np.array([p.prior for p in mine]), 1.0)
-    left = left * np.outer(ratio, ratio)  # per prior beforehand
-    count = len(sizes.groups)
-    if not len(sizes.deviation):
-        size = np.bincount(group, np.diag(left)[:-1], count)
-        scale = np.sqrt(left[-1, -1] / np.maximum(size, 1e-300) / count)
-        sizes = replace(sizes, scale=np.clip(scale, _LEAST, _MOST))
-        start = sizes.scale
-    else:
-        start = np.maximum(sizes.deviation, _AGAIN * sizes.scale)  # what was nothing may come back
-    deviation, known, noise = _climbed(left, of.rows, group, count, start, sizes.scale, not _declared(problem))
-    before = sizes.deviation if len(sizes.deviation) else deviation
-    moved = np.abs(np.log(deviation / before)) * np.minimum(known, 1.0)
-    change = float(moved.max(initial=0.0)) if len(sizes.deviation) else np.inf
-    parameters = tuple(
-        replace(p, prior=float(unit_of * deviation[sizes.place[p.name]])) if p.name in sizes.place else p
-        for p, unit_of in zip(free.parameters, _spread(graded, unit), strict=True)
-    )
+    free = problem.free
+    graded = np.array([name in sizes.place for name in free.names])
+    own = [p for p in free.parameters if p.name in sizes.place]
+    unit = np.array([priors[p.name] for p in own])
+    group = np.array([sizes.place[p.name] for p in own])
+    rows, moments = _moments_of(problem, graded, joints, weight)
+    scale = np.append(unit / np.array([p.prior for p in own]), 1.0)
+    moments = moments * np.outer(scale, scale)  # per prior beforehand
+    count, first = len(sizes.groups), not len(sizes.deviation)
+    if first:
+        size = np.bincount(group, np.diag(moments)[:-1], count)
+        expected = np.sqrt(moments[-1, -1] / np.maximum(size, 1e-300) / count)
+        sizes = replace(sizes, scale=np.clip(expected, _LEAST, _MOST))
+    start = sizes.scale if first else np.maximum(sizes.deviation, _AGAIN * sizes.scale)  # nothing may come back
+    declared = any(block.declared for block in problem.blocks)
+    deviation, known, noise = _climbed(moments, rows, group, count, start, sizes.scale, noisy=not declared)
+    moved = np.inf if first else np.abs(np.log(deviation / sizes.deviation)) * np.minimum(known, 1.0)
+    prior = free.prior
+    prior[graded] = unit * deviation[group]
     factor = min(1.0, float(np.sqrt(noise)))
-    there = replace(
+    weighed = replace(
         problem,
-        free=FreeParameters(parameters),
+        free=FreeParameters(tuple(replace(p, prior=float(d)) for p, d in zip(free.parameters, prior, strict=True))),
         noise={name: factor * value for name, value in problem.noise.items()},
         widened=max(1.0, problem.widened * factor),
     )
-    return there, replace(sizes, deviation=deviation, known=known), change, joints * factor**2
+    change = float(np.max(moved, initial=0.0))
+    return weighed, replace(sizes, deviation=deviation, known=known), change, joints * factor**2
 
 
-def _declared(problem: Problem) -> bool:
-    return any(block.declared for block in problem.blocks)
+def _moments_of(problem: Problem, graded: NDArray[np.bool_], joints: Array, weight: Array) -> tuple[float, Array]:
+    """Return how many equations there are, and their products for graded parameters with the others integrated out.
 
-
-def _spread(graded: NDArray[np.bool_], values: Array) -> Array:
-    found = np.ones(len(graded))
-    found[graded] = values
-    return found
+    The rate of warm-up stays as it is: by its slope it would stand in for the lengths that warm up.
+    """
+    names = problem.free.names
+    of = curve_moments(problem, NO_CURVES, joints, weight, 1.0)
+    stays = np.array([name == RATE for name in names])
+    away = np.eye(len(names) + 1)
+    away[:-1, -1] = np.where(stays, -of.away, 0.0)
+    others = ~graded & ~stays
+    order = np.concatenate([np.flatnonzero(others), np.flatnonzero(graded), [len(names)]])
+    moments = (away.T @ of.moments @ away)[np.ix_(order, order)]
+    return of.rows, moments_without(moments, int(others.sum()))
 
 
 def _climbed(
-    moments: Array, rows: float, group: NDArray[np.intp], count: int, start: Array, scale: Array, noisy: bool
+    moments: Array, rows: float, group: NDArray[np.intp], count: int, start: Array, scale: Array, *, noisy: bool
 ) -> tuple[Array, Array, float]:
     """Return the likeliest deviation of each group, what the data know of it, and the variance of the noise."""
     A, b, squares = moments[:-1, :-1], moments[:-1, -1], float(moments[-1, -1])
@@ -173,11 +169,6 @@ def _climbed(
         if change < _SETTLED:
             break
     return np.sqrt(variance), known, noise
-
-
-def priors_beforehand(parameters: Sequence[Parameter]) -> Mapping[str, float]:
-    """Return the prior of every parameter."""
-    return {p.name: p.prior for p in parameters}
 
 
 #: Deviations that are tried for a group, and the largest by that found.

@@ -31,7 +31,7 @@ from truearm.engine.fit.problem import (
     find_redundancies,
     gauge_freedoms,
 )
-from truearm.engine.fit.relevance import NO_SIZES, Sizes, priors_beforehand, with_sizes
+from truearm.engine.fit.relevance import NO_SIZES, Sizes, with_sizes
 from truearm.engine.fit.solver import SMALL, Solution, solve
 from truearm.engine.fit.start_values import start_from_readings, unanchored
 from truearm.engine.fit.variance_components import Components, CovariancePart, beyond_chance, variance_components
@@ -352,7 +352,7 @@ def _solve_in_rounds(
         problem = replace(problem, free=curves.known_of(problem.free))
         limits = _within(within, every.free, problem.free)
     sizes = Sizes.none_of(problem) if weighed else NO_SIZES
-    priors = priors_beforehand(every.free.parameters)
+    priors = {p.name: p.prior for p in every.free.parameters}
     joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
     solution = solve_with_joints(problem, joints, loss, limits, small)
     step = _COARSE if sizes else small

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from truearm.engine.fit.curves import NO_CURVES, CurveMoments, curve_moments, moments_without
 from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects.compliance import Compliance
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.effects.warm_up import RATE
 from truearm.engine.robot.parameters import FreeParameters
@@ -30,6 +31,8 @@ from truearm.engine.robot.parameters import FreeParameters
 #
 #: Scale of the deviations of groups, by what would make all groups together explain what is left over.
 _SCALE: Final = 1.0
+#: Of effects other than compliance, by that: they are smaller than what loads do to the joints of most arms.
+_BESIDE: Final = 0.3
 #: Parameters that what is believed of a variance beforehand counts for.
 _SPARSE: Final = 2.0
 #: Information of the readings on a group that is none, and what its variance is then multiplied by in a step.
@@ -105,7 +108,8 @@ def with_sizes(
     if first:
         size = np.bincount(group, np.diag(moments)[:-1], count)
         expected = np.sqrt(moments[-1, -1] / np.maximum(size, 1e-300) / count)
-        sizes = replace(sizes, scale=np.clip(expected, _LEAST, _MOST))
+        beside = np.array([1.0 if key[0] == Compliance.name else _BESIDE for key in sizes.groups])
+        sizes = replace(sizes, scale=np.clip(beside * expected, _LEAST, _MOST))
     start = sizes.scale if first else np.maximum(sizes.deviation, _AGAIN * sizes.scale)  # nothing may come back
     declared = any(block.declared for block in problem.blocks)
     deviation, known, noise = _climbed(moments, rows, group, count, start, sizes.scale, noisy=not declared)

@@ -33,7 +33,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
 from truearm.engine.diagnose.curves import FittedCurve, fitted_curves
 from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
-from truearm.engine.diagnose.expected_error import ExpectedError, expected_error
+from truearm.engine.diagnose.expected_error import ExpectedError, expected_error, moved_by_order
 from truearm.engine.diagnose.gain import NO_GAIN, Repeatability, repeatability
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
@@ -295,7 +295,8 @@ class Calibration(Record):
         training = self.data.of_configurations(self.training)
         inside = np.flatnonzero(verdict.box.holds(flange_places(self.fit.start, training.postures), self.zones.overlap))
         part = training.of_configurations(inside)
-        proof = proof_of(fit, fit.status, self.warnings, expected_error(fit), part, self.known_before)
+        expected = expected_error(fit, by_order=moved_by_order(fit.robot, part))
+        proof = proof_of(fit, fit.status, self.warnings, expected, part, self.known_before)
         line = f"{self.history}, zone {verdict.box.name}"
         return sealed(replace(fit.robot, history=(*fit.robot.history, line), tools={}, truths={}), proof)
 

@@ -13,7 +13,12 @@ from truearm.engine.data.rigid_tool import OUTLIERS, TARGET_MISTAKEN, TARGETS_SW
 from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import JOINTS_REPEATED
 from truearm.engine.diagnose.changes import Change, notices_of_change, what_moved
-from truearm.engine.diagnose.expected_error import ExpectedError, as_residuals_allow, expected_error
+from truearm.engine.diagnose.expected_error import (
+    ExpectedError,
+    as_residuals_allow,
+    expected_error,
+    moved_by_order,
+)
 from truearm.engine.diagnose.far_off import PULLING
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
 from truearm.engine.diagnose.off_configurations import Off, off_configurations
@@ -108,7 +113,8 @@ class Case:
         """How accurate the robot is where it was not measured."""
         doubted = has_error([*self.of_data, *self.changes]) or any(n.code in _DOUBTING for n in self.of_data)
         allowed = as_residuals_allow(self.fit, self.training)
-        return expected_error(allowed, plausible=not self.implausible, doubted=doubted)
+        by_order = moved_by_order(self.fit.robot, self.training)
+        return expected_error(allowed, by_order=by_order, plausible=not self.implausible, doubted=doubted)
 
     @property
     def status(self) -> Status:

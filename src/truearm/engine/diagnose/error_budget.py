@@ -301,6 +301,7 @@ def _remainder_words(square: float, doubt: float) -> str:
 def _over_workspace(fit: Fit, expected: ExpectedError) -> tuple[Share, ...]:
     """Return the shares of the mean square to expect over the workspace."""
     plain = replace(fit, joint_error=np.zeros_like(fit.joint_error))
+    approach = ", and the direction of approach" * bool((expected.joint_error > 1.001 * fit.joint_error).any())
     joints = fit.robot.random_configurations(_CONFIGURATIONS, np.random.default_rng(0))
     squares = np.mean(PositionErrors(plain, _DRAWS).at(joints) ** 2, axis=(1, 2))
     return (
@@ -310,7 +311,7 @@ def _over_workspace(fit: Fit, expected: ExpectedError) -> tuple[Share, ...]:
             expected.by_joint_error**2,
             0.0,
             "errors of the joints that the readings of a configuration share: what the model cannot express, and "
-            "repeatability",
+            f"repeatability{approach}",
         ),
     )
 

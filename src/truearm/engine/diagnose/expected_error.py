@@ -72,8 +72,8 @@ class ExpectedError:
     #: The same without errors of the scale, where no length was measured: what more configurations can lower.
     without_scale: Expectation
     targets: dict[str, Expectation]  #: Of each, by its name.
-    #: Error of each joint in every visit that is in it, a standard deviation [rad or m]: repeatability plus what the
-    #: model leaves.
+    #: Error of each joint in every visit that is in it, a standard deviation [rad or m]: repeatability, what the model
+    #: leaves, and what follows the direction of approach.
     joint_error: Array
     by_joint_error: float  #: Root mean square of what that does to the targets.
     payload: Payload  #: What the robot carries there.
@@ -189,7 +189,9 @@ def moved_lengths(fit: Fit, joints: Array, errors: Mapping[str, Array]) -> Array
     return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)
 
 
-def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True, doubted: bool = False) -> ExpectedError:
+def expected_error(
+    fit: Fit, seed: int = 0, *, by_order: Array | None = None, plausible: bool = True, doubted: bool = False
+) -> ExpectedError:
     """Return the error of the targets' positions to expect over the workspace.
 
     Joint positions are drawn evenly within the limits (or a turn, or 1 m), with payload and gravity of the fit. Base
@@ -198,6 +200,7 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True, doubted: 
 
     Args:
         seed: Of joint positions and draws.
+        by_order: What predictions do not know of each joint, as :func:`moved_by_order` returns it.
         plausible: Whether what was fitted can be this robot.
         doubted: Whether readings are doubted: then nothing is said of the robot for what they leave.
     """
@@ -207,21 +210,44 @@ def expected_error(fit: Fit, seed: int = 0, *, plausible: bool = True, doubted: 
     few, many = _DRAWS
     draws = min(many, max(few, _LENGTHS // (count * max(len(robot.targets), 1))))
     joints = _all_over(robot, count, np.random.default_rng(seed))
+    by_joints = _error_by_joints(fit, joints)
+    if by_order is not None:
+        fit = replace(fit, joint_error=np.hypot(fit.joint_error, by_order))
     lengths = PositionErrors(fit, draws, seed).at(joints)
     overall = without_scale = _expectation(lengths.reshape(draws, -1))
     if "size" in fit.gauge_freedoms:
         without_scale = _expectation(PositionErrors(fit, draws, seed, scale_counts=False).at(joints).reshape(draws, -1))
-    by_joints = _error_by_joints(fit, joints)
     return ExpectedError(
         overall=overall,
         without_scale=without_scale,
         targets={t.name: _expectation(lengths[:, k]) for k, t in enumerate(robot.targets)},
         joint_error=fit.joint_error,
-        by_joint_error=by_joints,
+        by_joint_error=_error_by_joints(fit, joints),
         payload=robot.payload,
         located=not fit.gauge_freedoms,
         omissions=tuple(_omissions(fit, by_joints, overall, plausible=plausible, doubted=doubted)),
     )
+
+
+def moved_by_order(robot: Robot, data: Dataset) -> Array:
+    """Return by how much the direction of approach moves each joint, a root mean square ``(joints,)`` [rad or m].
+
+    Predictions do not know it, and count it as an error of the joint.
+
+    Args:
+        data: Of the campaign.
+    """
+    at = robot.loaded(data.postures)
+    known, unknown = (robot.variables(q, robot.values) for q in (at, replace(at, approach=None)))
+    return np.asarray(np.sqrt(np.mean((known - unknown)[: len(robot.joints)] ** 2, axis=1)))
+
+
+def error_by_order(robot: Robot, data: Dataset) -> float:
+    """Return how far predictions without an order lie from those of a campaign, a root mean square [m]."""
+    at = robot.loaded(data.postures)
+    unknown = replace(at, approach=None, number=None)
+    apart = [robot.world_poses(at, t.name)[0] - robot.world_poses(unknown, t.name)[0] for t in robot.targets]
+    return math.sqrt(float(np.mean(np.sum(np.square(apart), axis=-1))))
 
 
 def as_residuals_allow(fit: Fit, data: Dataset) -> Fit:

@@ -18,8 +18,10 @@ from truearm.engine.diagnose.expected_error import (
     ExpectedError,
     PositionErrors,
     as_residuals_allow,
+    error_by_order,
     expected_error,
     expected_map,
+    moved_by_order,
 )
 from truearm.engine.diagnose.unmodelled import PULLED_AWAY
 from truearm.engine.diagnose.wrong_robot import IMPLAUSIBLE
@@ -147,7 +149,7 @@ def check_narrow_data_without_geometry(
     model = named_model("geometric").also([e for e in fit.model.effects if e not in named_model("geometric").effects])
     nominal = fit.robot.with_values({name: p.nominal for name, p in fit.start.parameters.items()})
     wider = identify(nominal, measured, model, loss=loss, fixed=fit.fixed)
-    expected = expected_error(as_residuals_allow(wider, measured))
+    expected = expected_error(as_residuals_allow(wider, measured), by_order=moved_by_order(wider.robot, measured))
     apart = _apart(fit, wider)
     low, high = expected.without_scale.interval_90
     both = replace(
@@ -192,6 +194,7 @@ def check_narrow_data(
     known = of_readings.mean
     if not held_out:  # the parameters have taken their part of these
         known *= math.sqrt(fit.numbers / max(fit.numbers - fit.spent, 1.0))
+    known = math.hypot(known, error_by_order(fit.robot, measured))
     mean, (low, high) = expected.without_scale.mean, expected.without_scale.interval_90
     if (judged.position is None or fit.gauge_freedoms) and mean > _NEGLIGIBLE:
         # Such readings see positions badly wherever the arm is, and a length is one coordinate of three.

@@ -290,8 +290,8 @@ def check_shares(shares: Shares) -> list[Notice]:
         notices.append(
             ORDER_IN_THE_MODEL(
                 f"The model follows the order of this campaign ({listed(ordered)}). That cleans the other parameters. "
-                "Predictions whose place in an order is not known, of other sessions for example, are those of the "
-                "middle of this one."
+                "Predictions of other sessions and of programs are those of the middle of this one. What the order "
+                "does is in the expected error, and not in the held-out error."
             )
         )
     certain = [line for line in shares.lines if line.chance < LARGEST_CHANCE]

@@ -48,6 +48,7 @@ from truearm.engine.fit.solver import SMALL, Solution
 from truearm.engine.fit.start_values import start_from_readings, unanchored
 from truearm.engine.fit.variance_components import Components, CovariancePart, cluster_covariance, widening
 from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects.warm_up import LEFT, RATE, share_left
 from truearm.engine.robot.parameters import SCALE, FreeParameters
 from truearm.engine.robot.robot import Robot
 
@@ -189,7 +190,8 @@ class Fit:
     steps: int  #: Steps of the solver, over all stages.
     fixed: FixedPlaces = NOTHING_FIXED  #: Places that were known, and not found.
     bootstrap: int = 0  #: How many fits to configurations drawn anew the covariance follows from; 0 if from none.
-    #: Coefficients of joint curves that are zero, and uncertain: the data could not tell them.
+    #: Parameters that are uncertain although they were not fitted: coefficients of joint curves that are zero because
+    #: the data could not tell them, and how warm the arm is in another session.
     unfitted: tuple[str, ...] = ()
 
     def parameter_status(self, name: str) -> ParameterStatus:
@@ -210,7 +212,9 @@ class Fit:
         """Covariance of the free parameters and, behind them, of the unfitted ones [SI]."""
         if not self.unfitted:
             return self.covariance
-        return np.asarray(np.sum([part.covariance for part in self.covariance_parts], axis=0))
+        whole = np.sum([part.covariance for part in self.covariance_parts], axis=0)
+        whole[: len(self.covariance), : len(self.covariance)] = self.covariance
+        return np.asarray(whole)
 
     @property
     def correlations(self) -> Array:
@@ -307,6 +311,9 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
     open_ = _left_open(problem, x, limits) if not problem.priors and not solved.redundancies else []
     scattered = components is None or not components.holds
     covariance, parts, informed, unfitted = _worth(solved, loss, draws, at_bound, open_, scattered)
+    if problem.data.number is not None and LEFT in start.parameters:
+        share = share_left(problem.data.number, in_the_middle(solved.robot, problem.data).values[RATE])
+        parts, unfitted = _with_uncertain(parts, float(share.var())), (*unfitted, LEFT)
     deviation = np.sqrt(np.diag(covariance))
     identified = [
         replace(start.parameters[n], value=float(v))
@@ -418,6 +425,14 @@ def _worth(
         if solved.sizes:
             informed = np.clip(told[: len(x)], 0.0, 1.0)
     return covariance, parts, informed, unfitted
+
+
+def _with_uncertain(parts: tuple[CovariancePart, ...], variance: float) -> tuple[CovariancePart, ...]:
+    """Return parts of a covariance with one more parameter behind, of a variance [SI] that no reading changes."""
+    first = np.arange(len(parts[0].covariance) + 1) < len(parts[0].covariance)
+    *others, last = (part.among(first) for part in parts)
+    last.covariance[-1, -1] = variance
+    return (*others, last)
 
 
 def _weights(problem: Problem, solution: Solution, loss: Loss) -> Array:

@@ -30,9 +30,7 @@ from truearm.engine.robot.parameters import FreeParameters
 # together explain what the arm alone leaves, each its share.
 #
 #: Scale of the deviations of groups, by what would make all groups together explain what is left over.
-_SCALE: Final = 1.0
-#: Of effects other than compliance, by that: they are smaller than what loads do to the joints of most arms.
-_BESIDE: Final = 0.3
+_SCALE: Final = 0.3
 #: Parameters that what is believed of a variance beforehand counts for.
 _SPARSE: Final = 2.0
 #: Information of the readings on a group that is none, and what its variance is then multiplied by in a step.
@@ -67,7 +65,7 @@ class Sizes:
         """Return the groups of a problem, of which nothing is known yet."""
         groups: dict[tuple[str, ...], list[str]] = {}
         pooled = {effect.name for effect in problem.robot.effects if effect.stretches}
-        own = {effect.name for effect in problem.robot.effects} - {JointCurve.name}
+        own = {effect.name for effect in problem.robot.effects} - {JointCurve.name, Compliance.name}
         for p in problem.free.parameters:
             if p.group in own and p.name != RATE:
                 joint = "" if p.group in pooled else re.sub(r".*_", "", p.name)
@@ -108,8 +106,7 @@ def with_sizes(
     if first:
         size = np.bincount(group, np.diag(moments)[:-1], count)
         expected = np.sqrt(moments[-1, -1] / np.maximum(size, 1e-300) / count)
-        beside = np.array([1.0 if key[0] == Compliance.name else _BESIDE for key in sizes.groups])
-        sizes = replace(sizes, scale=np.clip(beside * expected, _LEAST, _MOST))
+        sizes = replace(sizes, scale=np.clip(_SCALE * expected, _LEAST, _MOST))
     start = sizes.scale if first else np.maximum(sizes.deviation, _AGAIN * sizes.scale)  # nothing may come back
     declared = any(block.declared for block in problem.blocks)
     deviation, known, noise = _climbed(moments, rows, group, count, start, sizes.scale, noisy=not declared)
@@ -150,7 +147,7 @@ def _climbed(
     A, b, squares = moments[:-1, :-1], moments[:-1, -1], float(moments[-1, -1])
     sizes = np.bincount(group, minlength=count)
     known: Array = np.zeros(count)
-    variance, prior = start**2, (_SCALE * scale) ** 2
+    variance, prior = start**2, scale**2
     noise = 1.0
     for _ in range(_STEPS):
         root = np.sqrt(variance)[group]
@@ -219,7 +216,7 @@ def _tried(most: float) -> Array:
 
 def _believed(deviations: Array, scale: float) -> Array:
     """Return how likely deviations are beforehand, where they are tried evenly in their logarithms."""
-    return np.asarray(1.0 / (1.0 + (deviations / (_SCALE * scale)) ** 2))
+    return np.asarray(1.0 / (1.0 + (deviations / scale) ** 2))
 
 
 #: Of a model whose effects have the sizes that their priors say.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -17,7 +18,13 @@ from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.expected_error import as_residuals_allow, expected_error, expected_map
+from truearm.engine.diagnose.expected_error import (
+    as_residuals_allow,
+    error_by_order,
+    expected_error,
+    expected_map,
+    moved_by_order,
+)
 from truearm.engine.fit.fit import Fit, Status, identify
 from truearm.engine.fit.models import FRAMES, MODELS, Model
 from truearm.engine.fit.variance_components import CovariancePart
@@ -27,6 +34,7 @@ from truearm.engine.twin.devices import named_device
 from truearm.engine.twin.devices.device import measured_with
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
+from truearm.engine.twin.twin_joint import JointTruth
 
 MODEL: Mapping[str, Model] = {m.name: m for m in (FRAMES, *MODELS)}
 IRB120 = load_robot("irb120")
@@ -290,3 +298,22 @@ def test_a_closed_loop_is_expected_up_to_its_gauge_freedoms() -> None:
     (notice,) = (n for n in result.warnings if n.code == "closed-loop")
     assert f"accurate to about {result.expected.overall.mean * 1e3:.2g} mm" in notice.message
     assert "narrow-data" not in {n.code for n in result.warnings}
+
+
+def test_what_follows_the_order_is_expected_of_predictions_that_do_not_know_it() -> None:
+    rng = np.random.default_rng(3)
+    joints = {1: JointTruth(hysteresis=math.radians(0.01), warm_up=6e-4), 2: JointTruth(hysteresis=math.radians(0.01))}
+    twin = replace(truth_twin(IRB120, "nominal", rng), joints=joints)
+    data = measure(twin, IRB120.random_configurations(60, rng), 1e-6, rng)
+    fit = identify(IRB120, data, MODEL["geometric"].also(["approach", "warm-up"]))
+    by_order = moved_by_order(fit.robot, data)
+    np.testing.assert_allclose(by_order, [*[math.radians(0.01)] * 2, 0, 0, 0, 0], atol=1e-5)
+    numbers = rng.integers(0, 60, 60).astype(float)
+    other = measure(twin, IRB120.random_configurations(60, rng), 0.0, rng, number=numbers)
+    known_order = errors_of(fit.robot, other).position_norms.mean()
+    unknown = float(errors_of(fit.robot, replace(other, number=None, approach=None)).position_norms.mean())
+    low, high = expected_error(fit, by_order=by_order).overall.interval_90
+    assert known_order < 0.1 * low < low < unknown < high
+    assert error_by_order(fit.robot, data) == pytest.approx(unknown, rel=0.25)
+    assert fit.unfitted == ("warm_up_left",)
+    assert not moved_by_order(fit.robot, replace(data, approach=None)).any()

@@ -137,6 +137,13 @@ def test_backlash_is_found_where_there_is_some() -> None:
     assert mean_error(identify(irb120(), worn()[0], ELASTIC).robot, unseen) > 1e-4
 
 
+def test_of_few_readings_it_is_as_good_as_the_elastic_model() -> None:
+    data = unordered(one_target(seen(irb120(), 16, 30)))
+    unseen = unordered(one_target(seen(irb120(), 200, 20)))
+    elastic = mean_error(identify(irb120(), data, ELASTIC).robot, unseen)
+    assert mean_error(identify_every_effect(irb120(), data)[1].robot, unseen) < 1.05 * elastic
+
+
 def test_the_direction_of_approach_is_found_where_it_matters() -> None:
     _, _, shares = identify_every_effect(arm(), seen(arm(), 50, 3, hysteresis=math.radians(0.02)))
     assert moves(shares, "approach") > 1e-4

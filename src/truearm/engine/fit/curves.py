@@ -629,6 +629,7 @@ def parts_with_curves(
     problem: Problem,
     curves: Curves,
     joints: Array,
+    erring: NDArray[np.bool_],
     weight: Array,
     certain: NDArray[np.bool_],
     scatter: CovariancePart | None,
@@ -639,6 +640,8 @@ def parts_with_curves(
     Args:
         problem: At the solution, whose values its free parameters have.
         joints: Variances of the joints' errors that readings are weighed by.
+        erring: Which joints were found to err at a visit. If none of its curve was found, what its gears may do is in
+            that.
         weight: What the loss leaves of each reading.
         certain: Which of its free parameters are certain, ``(free,)``.
         scatter: What the readings' noise adds to the covariance of the free parameters [SI], where it follows from
@@ -661,7 +664,12 @@ def parts_with_curves(
     whole, beforehand, informed = curve_covariance(of, variance, sure, expected)
     fitted = set(free.names)
     more = [name for name, on in zip(names, that_matter(of, variance).tolist(), strict=True) if on] if names else []
-    more = [name for name in more if name not in fitted]
+    known = {curves.places[name][0] for name in fitted.intersection(names)}
+    more = [
+        name
+        for name in more
+        if name not in fitted and (curves.places[name][0] in known or not erring[curves.places[name][0]])
+    ]
     order = [place[name] for name in (*free.names, *more)]
     size = np.concatenate([[p.prior for p in others], np.ones(len(names))])[order]
     if scatter is None:

@@ -28,6 +28,7 @@ from truearm.engine.robot.effects.balancing import Balancing
 from truearm.engine.robot.effects.linear_contact import LinearContactClearance
 from truearm.engine.robot.effects.transmission import TransmissionError
 from truearm.engine.robot.loads import has_weight
+from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 
 #: Name of the model.
@@ -184,7 +185,8 @@ def with_lines(robot: Robot, lines: Sequence[PeriodicError]) -> Robot:
 def _shares(robot: Robot, fit: Fit, data: Dataset, lines: tuple[PeriodicError, ...]) -> Shares:
     """Return what every effect does at the readings of a fit."""
     identified, shares = fit.robot, list[EffectShare]()
-    whole = _places(identified, data)
+    at = identified.loaded(data.postures)
+    whole = _places(identified, at, data)
     for effect in EFFECTS:
         free = [p for p in fit.free.parameters if p.group == effect.name]
         if effect.name not in fit.model.effects:
@@ -194,15 +196,14 @@ def _shares(robot: Robot, fit: Fit, data: Dataset, lines: tuple[PeriodicError, .
             continue
         parameters = [identified.parameters[p.name] for p in free]
         known = sum(p.informed or 0.0 for p in parameters)
-        moved = whole - _places(identified.with_values({p.name: p.nominal for p in parameters}), data)
+        moved = whole - _places(identified.with_values({p.name: p.nominal for p in parameters}), at, data)
         moves = float(np.sqrt(np.mean(np.sum(moved**2, axis=1)))) if len(moved) else 0.0
         shares.append(EffectShare(effect.name, moves, known, len(free)))
     return Shares(tuple(sorted(shares, key=lambda share: -(share.moves or 0.0))), lines)
 
 
-def _places(robot: Robot, data: Dataset) -> Array:
-    """Return where the target of each reading is predicted [m], ``(readings, 3)``."""
-    at = robot.loaded(data.postures)
+def _places(robot: Robot, at: Postures, data: Dataset) -> Array:
+    """Return where the target of each reading is predicted at postures with their loads [m], ``(readings, 3)``."""
     places = np.array([robot.world_poses(at, name)[0] for name in data.targets])
     return np.asarray(places[data.target, data.configuration])
 

@@ -418,8 +418,10 @@ def _worth(
         )
         joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
         alone = parts[0] if scattered or draws is not None else None
+        erring = joints > 0.0 if components is None else components.likeliest.joints > 0.0
+        sizes_of = partial(expected_sizes, solved.sizes)
         unfitted, parts, told = parts_with_curves(
-            at_solution, solved.curves, joints, solution.weight, at_bound, alone, partial(expected_sizes, solved.sizes)
+            at_solution, solved.curves, joints, erring, solution.weight, at_bound, alone, sizes_of
         )
         covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
         if solved.sizes:

@@ -37,6 +37,8 @@ AUTO: Final = "auto"
 _ASKED_FOR: Final = frozenset({LinearContactClearance.name})
 #: Numbers of periods that a joint may have.
 _LINES: Final = 8
+#: Periods in a turn up to which a joint's curve is looked for; lines begin below that.
+_HIGHEST: Final = 30
 #: How many lines as strong as the weakest chance would show: those that are not there shrink as all else does.
 _CHANCE: Final = 1.0
 #: How often they are looked for at most, each time in what the fit before left.
@@ -111,7 +113,8 @@ def every_effect(robot: Robot, data: Dataset) -> Model:
     names = tuple(name for name in possible if closed_because(robot, data, name) is None)
     groups = named_model("geometric").groups
     summary = "geometric, and every joint effect as large as the data tell"
-    return Model(AUTO, summary, groups, names, tuple(name for name in possible if name not in names), weighed=True)
+    closed = tuple(name for name in possible if name not in names)
+    return Model(AUTO, summary, groups, names, closed, weighed=True, highest=_HIGHEST)
 
 
 def identify_every_effect(

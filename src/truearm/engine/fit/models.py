@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from truearm.engine.base.errors import InputError, did_you_mean
-from truearm.engine.robot.effects.joint_curve import PRIOR, JointCurve
+from truearm.engine.robot.effects.joint_curve import HIGHEST, PRIOR, JointCurve, curve_names
 from truearm.engine.robot.parameters import SCALE_GROUP, FreeParameters, Group
 from truearm.engine.robot.robot import Robot
 
@@ -23,6 +23,7 @@ class Model:
     #: Joint effects that could have been, had the data said that they help; bounds may name their parameters.
     tried: tuple[str, ...] = ()
     weighed: bool = False  #: Whether the data tell how large each effect is.
+    highest: int = HIGHEST  #: Periods in a turn of the term of the joints' curves that errs most often.
 
     def also(self, effects: Sequence[str]) -> Model:
         """Return the model with some joint effects added."""
@@ -47,7 +48,10 @@ class Model:
     def free(self, robot: Robot) -> FreeParameters:
         """Return the free parameters of a robot, base first, targets and fixtures last."""
         groups = ("base", "target", "fixture", SCALE_GROUP, *self.groups, *self.effects)
-        return FreeParameters(tuple(p for p in robot.parameters.values() if p.group in groups))
+        turns = range(1, len(robot.joints) + 1)
+        beyond = {name for number in turns for name in curve_names(number)[2 * self.highest :]}
+        free = (p for p in robot.parameters.values() if p.group in groups and p.name not in beyond)
+        return FreeParameters(tuple(free))
 
 
 _LEVEL_2: Final[tuple[Group, ...]] = ("joint zero", "geometry")

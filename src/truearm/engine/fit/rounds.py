@@ -354,8 +354,8 @@ def _solve_in_rounds(
     sizes = Sizes.none_of(problem) if weighed else NO_SIZES
     priors = {p.name: p.prior for p in every.free.parameters}
     joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
-    solution = solve_with_joints(problem, joints, loss, limits, small)
     step = _COARSE if sizes else small
+    solution = solve_with_joints(problem, joints, loss, limits, step)
     steps = solution.steps
     components = None
     most = _ROUNDS + (curves.rounds if curves else 0) + (_ROUNDS if sizes else 0)

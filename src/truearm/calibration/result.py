@@ -123,12 +123,12 @@ class Calibration(Record):
     def least(self) -> Mapping[Kind, LeastError]:
         """The mean errors of the held-out readings that exact parameters would leave, of each kind where it is known.
 
-        Empty where nothing was held out.
+        Empty where nothing was held out. What a fit leaves that did not end well says nothing of it.
         """
         if self.validation is None:
             return {}
-        judged = self.data.of_configurations(self.held_out)
-        return least_errors(self.fit.robot, self.data, judged, self.fit, self.expected.joint_error)
+        judged, fit = self.data.of_configurations(self.held_out), self.fit if self.status.value in SOUND else None
+        return least_errors(self.fit.robot, self.data, judged, fit, self.expected.joint_error)
 
     @cached_property
     def budget(self) -> ErrorBudget | None:

@@ -36,6 +36,9 @@ _KINDS: Final[dict[Kind, tuple[str, ...]]] = {
     "length": ("distance", "height"),
 }
 
+#: What visits to fewer postures show need not hold elsewhere: farther out, errors of the joints do more.
+_FEWEST_POSTURES: Final = 5
+
 
 @dataclass(frozen=True)
 class LeastError:
@@ -87,25 +90,27 @@ def _of_visits(errors: Errors, data: Dataset, kind: Kind, declared: float | None
         "length": None if errors.length_errors is None else errors.length_errors[:, None],
     }[kind]
     again = None if vectors is None else visited_again(data, np.asarray(np.isfinite(vectors).all(axis=1)))
-    if again is None or vectors is None:
+    if again is None or vectors is None or again.postures < _FEWEST_POSTURES:
         return None
     lengths = np.linalg.norm(again.apart(vectors), axis=1) / np.sqrt(1.0 - 1.0 / again.count)
     return LeastError(float(lengths.mean()), "visits", declared, again.visits, again.postures)
 
 
-def _observed(data: Dataset, kind: Kind) -> list[Observation]:
-    return [each for each in OBSERVATIONS if each.name in _KINDS[kind] and each.present(data).any()]
+def _kind(observation: Observation) -> Kind:
+    return next(kind for kind, names in _KINDS.items() if observation.name in names)
 
 
 def _declared(data: Dataset, kind: Kind) -> float | None:
     """Return the mean error by the declared noise alone [m or rad]; None if it is not declared or nothing was read."""
     lengths = list[Array]()
-    for observation in _observed(data, kind):
+    for observation in OBSERVATIONS:
+        read = observation.present(data)
+        if _kind(observation) != kind or not read.any():
+            continue
         sigma = observation.declared_sigma(data)
         if sigma is None:
             return None
-        factor = math.sqrt((8.0 if observation.components == 3 else 2.0) / math.pi)
-        lengths.append(factor * sigma[observation.present(data)])
+        lengths.append(math.sqrt((8.0 if observation.components == 3 else 2.0) / math.pi) * sigma[read])
     return float(np.concatenate(lengths).mean()) if lengths else None
 
 
@@ -121,11 +126,13 @@ def _by_fit(fit: Fit, data: Dataset, joint_error: Array) -> dict[Kind, float]:
     by_joints = problem.at(problem.free.start).by_joints * shared
     lengths = dict[Kind, list[Array]]()
     for block, rows in problem.placed:
-        count = block.observation.components
+        kind, count = _kind(block.observation), block.observation.components
+        if not np.isfinite(block.sigma).all():
+            lengths.setdefault(kind, []).append(block.sigma)
+            continue
         J = by_joints[rows].reshape(-1, count, by_joints.shape[1])
         variances = np.zeros((len(J), 3))
         variances[:, :count] = np.linalg.eigvalsh(np.eye(count) + J @ np.swapaxes(J, 1, 2))
-        kind = next(kind for kind, names in _KINDS.items() if block.observation.name in names)
         lengths.setdefault(kind, []).append(block.sigma * mean_length(variances))
     means = {kind: float(np.concatenate(of_kind).mean()) for kind, of_kind in lengths.items()}
     return {kind: mean for kind, mean in means.items() if math.isfinite(mean)}

@@ -143,7 +143,7 @@ def test_what_the_model_cannot_follow_is_never_called_noise(targets: int, declar
         assert least.evidence == "residuals"
         assert least.mean > 10.0 * found.true
         assert "estimated from what the model leaves" in found.words
-        assert "What the model cannot follow is in it; only postures visited again tell that from noise" in found.words
+        assert "What the model cannot follow is in it; only revisits tell that from noise" in found.words
         assert "(noise and repeatability" not in found.words
         said = {f"(declared noise: mean {1e3 * (least.declared or 0.0):.3f})"}
         if least.mean < known(found.seen.position).mean:
@@ -168,7 +168,7 @@ def test_of_more_than_was_seen_no_figure_stands_beside_it() -> None:
     found = case(declared=3.0)
     assert found.least["position"].mean > known(found.seen.position).mean
     assert "(no more than declared noise)" in found.words
-    assert ", and no more was found. What the robot does not repeat is not in it: too few postures" in found.words
+    assert ", and no more was found; repeatability is not in it (too few revisits)." in found.words
 
 
 @pytest.mark.parametrize("evidence", ["visits", "declared", "residuals"])

@@ -230,15 +230,12 @@ def _least(mean: float, kind: Kind, least: LeastError) -> str:
         return f"Noise and repeatability alone make a mean of {figure}, as {seen} show{more}."
     if least.evidence == "declared":
         return (
-            f"The declared noise alone makes a mean of {figure}{more}. What the robot does not repeat is not in it: "
-            "too few postures were visited again."
+            f"The declared noise alone makes a mean of {figure}{more}; repeatability is not in it (too few revisits)."
         )
-    noise = ""
-    if least.declared is not None:
-        noise = f" The declared noise alone makes {least.declared * 1e3:.3f} {_UNITS[kind]}."
+    noise = "" if least.declared is None else f" The declared noise alone makes {least.declared * 1e3:.3f}."
     return (
         f"With exact parameters the mean would be {figure}, estimated from what the model leaves{more}. What the model "
-        f"cannot follow is in it; only postures visited again tell that from noise and repeatability.{noise}"
+        f"cannot follow is in it; only revisits tell that from noise and repeatability.{noise}"
     )
 
 

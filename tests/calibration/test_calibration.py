@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import sys
 from dataclasses import replace
@@ -21,6 +22,7 @@ import truearm as package
 from truearm.calibration.result import Calibration
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.data.statistics import errors_of
+from truearm.engine.fit.fit import Status
 
 
 @cache
@@ -67,6 +69,21 @@ def test_the_text_is_what_the_command_prints_and_is_short() -> None:
     assert "Status: converged." in text
     assert run(28)._repr_html_() == f"<pre>{text}</pre>".replace("'", "&#x27;")
     assert max(len(text), len(repr(run(28).residuals()))) <= 2000
+
+
+def test_what_exact_parameters_would_leave_stands_beside_the_held_out_error() -> None:
+    result = run(28)
+    assert list(result.summary()["least_error"]) == ["position_mm"]
+    shown, noise = result.summary()["least_error"]["position_mm"], pytest.approx(math.sqrt(8.0 / math.pi) * 0.05)
+    assert shown == {"mean": noise, "evidence": "declared", "declared_noise": noise, "visits": 0, "postures": 0}
+    assert result.result()["least_error"] == result.summary()["least_error"]
+    (line,) = (line for line in result.lines() if line.endswith(" mm (declared noise: mean 0.080)"))
+    assert line.startswith("  calibrated  mean 0.0")
+    assert "least_error" not in run().summary()
+    left = replace(result, fit=replace(result.fit, excess=2.0))
+    assert left.least["position"].evidence == "residuals"
+    unsound = replace(result, fit=replace(left.fit, status=Status.NOT_CONVERGED))
+    assert unsound.least == result.least
 
 
 def test_the_report_of_the_fit_has_a_line_for_every_parameter() -> None:

@@ -59,7 +59,8 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
     assert run.code == 0
     summary = json.loads(run.out)
     marks = {"simulated", "simulated_parts"}
-    assert {*summary} == {*marks, "status", "warnings", "next", "nominal", "train", "validation", "expected_mm"}
+    judged = {"nominal", "train", "validation", "expected_mm", "least_error"}
+    assert {*summary} == {*marks, *judged, "status", "warnings", "next"}
     assert summary["status"] == "converged"
     assert (summary["train"]["configurations"], summary["validation"]["configurations"]) == (28, 12)
     assert summary["nominal"]["configurations"] == 12

@@ -16,6 +16,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.validation.jobs import validate
+from truearm.validation.report import validation_html
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,13 @@ def test_new_readings_are_left_alone(calibrated: tuple[Path, Dataset]) -> None:
     folder, new = calibrated
     (folder / "new.csv").write_text(csv_text(new))
     assert validate(folder / "result" / "calibrated.yaml", folder / "new.csv").warnings == ()
-    assert validate(folder / "result" / "calibrated.yaml", new).warnings == ()
+    result = validate(folder / "result" / "calibrated.yaml", new)
+    assert result.warnings == ()
+    assert result.summary()["least_error"]["position_mm"]["mean"] == pytest.approx(0.0798, rel=1e-3)
+    said = "The declared noise alone makes a mean of 0.080 mm"
+    assert said in "\n".join(result.lines())
+    assert said in validation_html(result)
+    assert validate(folder / "result" / "calibrated.yaml", replace(new, sigma=None)).summary()["least_error"] == {}
 
 
 def test_renamed_targets_are_told(calibrated: tuple[Path, Dataset]) -> None:

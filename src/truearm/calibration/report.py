@@ -45,11 +45,10 @@ from truearm.engine.document.document import (
     pictured,
 )
 from truearm.engine.document.figures import correlation_map, expected_error_map, histogram, residuals, workspace
-from truearm.engine.document.summaries import expected_of
+from truearm.engine.document.summaries import expected_of, least_words
 from truearm.engine.document.tables import (
     SpreadRow,
     expected_rows,
-    noise_alone,
     noise_sentence,
     noise_table,
     parameter_rows,
@@ -299,10 +298,8 @@ def _lead(run: Calibration, rows: Sequence[SpreadRow], kind: str, unit: str, *, 
     if after.interval:
         low, high = after.interval
         words += f"Of configurations drawn alike the mean lies between {low} and {high} {unit} with 95 %. "
-    alone = noise_alone(run.fit, kind)
-    if alone:
-        known = "as the data declare it" if run.fit.declared else "estimated from the residuals"
-        words += f"The noise of a reading alone would make {alone} {unit} ({known}). "
+    if run.validation is not None:
+        words += "".join(f"{said} " for of, said in least_words(run.validation, run.least).items() if of == kind)
     words += (
         f"95 % of the readings are below {after.texts[2]} {unit} (before: {before.texts[2]} {unit}); the largest is "
         f"{after.texts[3]} {unit} (before: {before.texts[3]} {unit})."

@@ -35,11 +35,19 @@ from truearm.engine.diagnose.curves import FittedCurve, fitted_curves
 from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
 from truearm.engine.diagnose.expected_error import ExpectedError, expected_error, moved_by_order
 from truearm.engine.diagnose.gain import NO_GAIN, Repeatability, repeatability
+from truearm.engine.diagnose.least_error import Kind, LeastError, least_errors
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.simulated_calibrations import SimulatedCalibrations
 from truearm.engine.document.document import Block, detail, each, json_of, leaves_of, say, under
 from truearm.engine.document.records import Record
-from truearm.engine.document.summaries import error_line, errors_summary, expected_blocks, noise_blocks, shares_block
+from truearm.engine.document.summaries import (
+    error_line,
+    errors_summary,
+    expected_blocks,
+    least_block,
+    noise_blocks,
+    shares_block,
+)
 from truearm.engine.document.tables import parameter_lines
 from truearm.engine.fit.every_effect import Shares
 from truearm.engine.fit.fit import Fit, Status
@@ -112,6 +120,17 @@ class Calibration(Record):
         return repeatability(self.data, self.fit.sigma.get("position", 0.0))
 
     @cached_property
+    def least(self) -> Mapping[Kind, LeastError]:
+        """The mean errors of the held-out readings that exact parameters would leave, of each kind where it is known.
+
+        Empty where nothing was held out. What a fit leaves that did not end well says nothing of it.
+        """
+        if self.validation is None:
+            return {}
+        judged, fit = self.data.of_configurations(self.held_out), self.fit if self.status.value in SOUND else None
+        return least_errors(self.fit.robot, self.data, judged, fit, self.expected.joint_error)
+
+    @cached_property
     def budget(self) -> ErrorBudget | None:
         """What limits the accuracy: the mean square of the errors by its sources; None if there is nothing to part."""
         held_out = self.data.of_configurations(self.held_out) if len(self.held_out) else None
@@ -161,7 +180,7 @@ class Calibration(Record):
             yield say(
                 f"On {counted(unseen.configurations, 'configuration')} the fit has not seen:",
                 before,
-                f"  calibrated  {error_line(unseen)}",
+                f"  calibrated  {error_line(unseen, self.least)}",
                 validation=errors_summary(unseen),
             )
             yield detail(f"On the {trained}:", after)
@@ -177,6 +196,8 @@ class Calibration(Record):
         for leaf in leaves_of(self._further()):
             yield replace(leaf, in_json={})
         yield from expected_blocks(self.expected)
+        if unseen is not None:
+            yield least_block(unseen, self.least)
         if self.notes:
             yield say(notes=self.notes)
 

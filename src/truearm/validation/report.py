@@ -22,6 +22,7 @@ from truearm.engine.document.document import (
 )
 from truearm.engine.document.drawing import AFTER, COLOURS, Figure, axis, figure, rounded, significant
 from truearm.engine.document.figures import residuals
+from truearm.engine.document.summaries import least_words
 
 if TYPE_CHECKING:
     from truearm.engine.data.dataset import Dataset
@@ -46,6 +47,7 @@ def validation_html(validation: Validation) -> str:
     source = Path(validation.source).name
     heading = ("error", "readings", "mean", "RMS", "95 % below", "maximum")
     errors = Table(heading, _spreads(validation), caption="Errors of single readings", name="errors")
+    least = [Words(said, quiet=True) for said in least_words(validation.errors, validation.least).values()]
     refit = []
     if validation.refit:
         refit = [
@@ -68,7 +70,7 @@ def validation_html(validation: Validation) -> str:
         f"Validation of {title} – {source}",
         [
             *([Facts(facts)] if facts else []),
-            Section("", [*warned(validation.warnings), errors, *refit], "result"),
+            Section("", [*warned(validation.warnings), errors, *least, *refit], "result"),
             _over_distance(validation, drawn),
             *_orientations(validation, drawn),
             *(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -34,10 +35,11 @@ from truearm.engine.command.split import TRAINING_DATA, changed_since, training_
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, Spread, errors_of
 from truearm.engine.diagnose.external_force import check_force, check_payload
+from truearm.engine.diagnose.least_error import Kind, LeastError, least_errors
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.document.document import Block, each, say
 from truearm.engine.document.records import Record
-from truearm.engine.document.summaries import error_line, errors_summary, refit_block
+from truearm.engine.document.summaries import error_line, errors_summary, least_block, refit_block
 from truearm.engine.fit.refit import Refit
 from truearm.engine.fit.refit import refit as find_moved
 from truearm.engine.fit.zones import ZonedRobot, zoned_robot
@@ -107,11 +109,18 @@ class Validation(Record):
         """Statistics of errors of distances and heights [m]; None where none was read."""
         return self.errors.length
 
+    @cached_property
+    def least(self) -> Mapping[Kind, LeastError]:
+        """The mean errors that exact parameters would leave, as far as visits or declared deviations tell them."""
+        return {} if self.robot is None or self.data is None else least_errors(self.robot, self.data, self.data)
+
     def blocks(self) -> Iterator[Block]:
         """Give the errors, their parts, and where the readings lie, in mm and mrad."""
         configurations = counted(self.errors.configurations, "configuration")
         yield say(
-            f"On {configurations} of {self.source}:", f"  {error_line(self.errors)}", **errors_summary(self.errors)
+            f"On {configurations} of {self.source}:",
+            f"  {error_line(self.errors, self.least)}",
+            **errors_summary(self.errors),
         )
         if self.orientations is not None:
             yield orientation_block(self.orientations)
@@ -133,6 +142,7 @@ class Validation(Record):
             )
         if self.refit is not None:
             yield refit_block(self.refit)
+        yield least_block(self.errors, self.least)
         if self.notes:
             yield say(*(f"{name}: {note}" for name, note in self.notes.items()), notes=self.notes)
 

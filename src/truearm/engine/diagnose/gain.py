@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.engine.base.errors import Notice, Rule, counted, millimetres
-from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.dataset import Dataset, IntArray
 from truearm.engine.data.statistics import Errors
 from truearm.engine.robot.chain import Array
 
@@ -138,6 +139,69 @@ _SAME_REPEATABILITY: Final = 1e-9
 _LEAST_FREEDOM: Final = 10
 
 
+@dataclass(frozen=True, eq=False)
+class VisitedAgain:
+    """Readings at postures that were visited again, one of a target on each visit."""
+
+    readings: IntArray  #: Their indices in the data, ``(k,)``.
+    visit: IntArray  #: visit, posture: which of each they are of, ``(k,)``.
+    posture: IntArray
+    group: IntArray  #: Which of them are of one target at one posture: they have the same number, ``(k,)``.
+
+    @property
+    def freedom(self) -> int:
+        """How many of them tell something of the scatter."""
+        return len(self.readings) - len(np.unique(self.group))
+
+    @property
+    def visits(self) -> int:
+        """How many visits there were."""
+        return len(np.unique(self.visit))
+
+    @property
+    def postures(self) -> int:
+        """To how many postures."""
+        return len(np.unique(self.posture))
+
+    @property
+    def count(self) -> IntArray:
+        """How many readings each stands beside, itself among them, ``(k,)``."""
+        return np.asarray(np.bincount(self.group)[self.group])
+
+    def apart(self, values: Array) -> Array:
+        """Return by how much values of all readings, ``(readings, c)``, differ from the mean of theirs, ``(k, c)``."""
+        own = values[self.readings]
+        mean = np.stack([np.bincount(self.group, weights=axis) for axis in own.T], axis=1)
+        return np.asarray(own - mean[self.group] / self.count[:, None])
+
+
+def visited_again(data: Dataset, read: NDArray[np.bool_]) -> VisitedAgain | None:
+    """Return the readings of postures that were visited again; None if too few were.
+
+    Args:
+        data: Readings. Visits of a posture are configurations with the same joint positions, or visits of one
+            configuration.
+        read: Which readings count, ``(readings,)``.
+    """
+    chosen = np.flatnonzero(read)
+    if not len(chosen):
+        return None
+    at, none = data.configuration[chosen], np.zeros(len(chosen), dtype=np.intp)
+    postures = _numbered(np.round(data.joints / _SAME_REPEATABILITY).T)[at]
+    visit = _numbered(np.stack([at, none if data.visit is None else data.visit[chosen]]))
+    fixture = none if data.fixture is None else data.fixture[chosen]
+    group = _numbered(np.stack([postures, data.target[chosen], fixture]))
+    first = np.unique(np.stack([group, visit]), axis=1, return_index=True)[1]  # more on one visit say nothing of others
+    first = first[np.bincount(group[first])[group[first]] > 1]
+    again = VisitedAgain(chosen[first], visit[first], postures[first], group[first])
+    return again if again.freedom >= _LEAST_FREEDOM else None
+
+
+def _numbered(columns: Array | IntArray) -> IntArray:
+    """Return the same number for equal columns of ``(rows, n)``, ``(n,)``."""
+    return np.asarray(np.unique(columns, axis=1, return_inverse=True)[1].reshape(-1))
+
+
 # Readings of a target at the same joint positions, on separate visits, differ by the robot's repeatability and the
 # noise of the instrument; no model of the robot is needed. ISO 9283 states it as RP, the mean distance of the visits
 # from their barycentre plus three of its standard deviations. Here the scatter of all postures is taken together, the
@@ -159,51 +223,30 @@ def repeatability(data: Dataset, sigma: float) -> Repeatability | None:
     """Return the repeatability that postures visited again show; None if too few were.
 
     Args:
-        data: Readings. Visits of a posture are configurations with the same joint positions, or visits of one
-            configuration.
+        data: Readings.
         sigma: Standard deviation of a coordinate [m].
     """
-    read = np.flatnonzero(data.has_position)
-    if not len(read):
+    again = visited_again(data, data.has_position)
+    if again is None:
         return None
-    postures = np.unique(np.round(data.joints / _SAME_REPEATABILITY), axis=0, return_inverse=True)[1].reshape(-1)
-    visit = np.zeros(len(read), dtype=np.intp) if data.visit is None else data.visit[read]
-    at = data.configuration[read]
-    keys = np.stack([postures[at], data.target[read]])
-    sets = np.unique(keys, axis=1, return_inverse=True)[1].reshape(-1)
-    together = np.unique(np.stack([sets, at, visit]), axis=1, return_inverse=True)[1].reshape(-1)
-    first = np.unique(together, return_index=True)[1]  # several readings on one visit say nothing of the next
-    sets, at, visit, place = sets[first], at[first], visit[first], data.position[read][first]
-    count = np.bincount(sets)
-    again = count[sets] > 1
-    freedom = int((count[count > 1] - 1).sum())
-    if freedom < _LEAST_FREEDOM:
-        return None
-    centre = np.stack([np.bincount(sets, weights=axis) / count for axis in place.T], axis=1)
-    apart = (place - centre[sets])[again]
+    apart, freedom = again.apart(data.position), again.freedom
     own = np.linalg.eigvalsh(apart.T @ apart / freedom) - sigma**2
-    mean = _mean_length(np.maximum(own, 0.0))
+    mean = float(mean_length(np.maximum(own, 0.0)))
     spread = math.sqrt(max(float(np.maximum(own, 0.0).sum()) - mean**2, 0.0))
-    visits = len(np.unique(np.stack([at, visit])[:, again], axis=1).T)
     square = float(own.sum())
-    posture = postures[at[again]]  # of which all targets scatter together
-    beyond = np.bincount(
-        posture, np.einsum("ni,ni->n", apart, apart) - (square + 3.0 * sigma**2) * freedom / len(apart)
+    beyond = np.bincount(  # all targets of a posture scatter together
+        again.posture, np.einsum("ni,ni->n", apart, apart) - (square + 3.0 * sigma**2) * freedom / len(apart)
     )
     deviation = math.sqrt(float(beyond @ beyond)) / freedom
-    return Repeatability(mean + 3.0 * spread, len(np.unique(posture)), visits, square, deviation)
+    return Repeatability(mean + 3.0 * spread, again.postures, again.visits, square, deviation)
 
 
-def _mean_length(variances: Array) -> float:
-    """Return the mean length of a normal vector with variances along three axes.
+def mean_length(variances: Array) -> Array:
+    """Return the mean length of normal vectors with variances along three axes, ``(..., 3)``.
 
-    ``E sqrt(Q) = int (1 - E exp(-t Q)) t^-1.5 dt / (2 sqrt(pi))``, and ``E exp(-t Q)`` is the product of
-    ``(1 + 2 t v)^-0.5`` (Mathai and Provost 1992, "Quadratic forms in random variables", section 3.2b).
+    A normal vector is a direction on the sphere, stretched, times a length whose mean is ``sqrt(8 / pi)``; and the mean
+    over the sphere of ``sqrt(x a^2 + y b^2 + z c^2)`` is ``R_G(x, y, z)`` (Carlson 1995).
     """
-    largest = float(variances.max())
-    if largest <= 0.0:
-        return 0.0
-    logs = np.linspace(-30.0, 40.0, 1401)
-    t = np.exp(logs)
-    missing = -np.expm1(-0.5 * np.log1p(2.0 * t[:, None] * variances / largest).sum(axis=1))
-    return math.sqrt(largest) * float(np.trapezoid(missing / np.sqrt(t), logs)) / (2.0 * math.sqrt(math.pi))
+    from scipy.special import elliprg
+
+    return np.asarray(math.sqrt(8.0 / math.pi) * elliprg(*np.moveaxis(variances, -1, 0)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from truearm.engine.base.errors import counted, degrees, listed, millimetres
@@ -12,6 +12,7 @@ from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.statistics import Errors, Spread
 from truearm.engine.diagnose.expected_error import Expectation, ExpectedError
 from truearm.engine.diagnose.gain import Repeatability
+from truearm.engine.diagnose.least_error import Kind, LeastError
 from truearm.engine.document.document import Block, detail, say
 from truearm.engine.fit.every_effect import Shares
 from truearm.engine.fit.fit import Fit
@@ -157,15 +158,85 @@ def _scaled(spread: Spread, scale: float) -> dict[str, float]:
     }
 
 
-def error_line(errors: Errors) -> str:
-    """Return the statistics of one set of errors as a line."""
+#: Kinds of errors and the units in which they are shown, each a thousandth of the SI one.
+_UNITS: Final[dict[Kind, str]] = {"position": "mm", "orientation": "mrad", "length": "mm"}
+#: What stands beside a mean error, by what the least one follows from.
+_BESIDE: Final = {
+    "visits": "noise and repeatability",
+    "declared": "declared noise",
+    "residuals": "estimated from residuals",
+}
+
+
+def error_line(errors: Errors, least: Mapping[Kind, LeastError] | None = None) -> str:
+    """Return the statistics of one set of errors as a line, the mean that exact parameters would leave beside each."""
     parts = []
-    kinds = ((errors.position, "mm"), (errors.orientation, "mrad"), (errors.length, "mm of length"))
-    for spread, unit in kinds:
-        if spread is not None:
-            mean, rms, p95, largest = (value * 1e3 for value in (spread.mean, spread.rms, spread.p95, spread.max))
-            parts.append(f"mean {mean:.3f}  rms {rms:.3f}  95 % {p95:.3f}  max {largest:.3f} {unit}")
+    for kind, spread in _spreads(errors):
+        mean, rms, p95, largest = (value * 1e3 for value in (spread.mean, spread.rms, spread.p95, spread.max))
+        unit = f"{_UNITS[kind]}{' of length' if kind == 'length' else ''}"
+        beside = _beside(spread.mean, (least or {}).get(kind))
+        parts.append(f"mean {mean:.3f}  rms {rms:.3f}  95 % {p95:.3f}  max {largest:.3f} {unit}{beside}")
     return "   ".join(parts) if parts else "no readings"
+
+
+def _spreads(errors: Errors) -> Iterator[tuple[Kind, Spread]]:
+    of_kinds: tuple[tuple[Kind, Spread | None], ...] = (
+        ("position", errors.position),
+        ("orientation", errors.orientation),
+        ("length", errors.length),
+    )
+    return ((kind, spread) for kind, spread in of_kinds if spread is not None)
+
+
+def _beside(mean: float, least: LeastError | None) -> str:
+    """Return what stands beside a mean error [m or rad]; of what is estimated as larger than that, no figure."""
+    if least is None:
+        return ""
+    if least.mean < mean:
+        return f" ({_BESIDE[least.evidence]}: mean {least.mean * 1e3:.3f})"
+    if least.evidence != "residuals":
+        return f" (no more than {_BESIDE[least.evidence]})"
+    if least.declared is not None and least.declared < mean:
+        return f" ({_BESIDE['declared']}: mean {least.declared * 1e3:.3f})"
+    return " (no more than residuals let expect)"
+
+
+def least_block(errors: Errors, least: Mapping[Kind, LeastError]) -> Block:
+    """Return the mean errors that exact parameters would leave, in mm and mrad, and what each follows from."""
+    return detail(
+        *least_words(errors, least).values(),
+        least_error={
+            f"{kind}_{_UNITS[kind]}": {
+                "mean": of_kind.mean * 1e3,
+                "evidence": of_kind.evidence,
+                "declared_noise": None if of_kind.declared is None else of_kind.declared * 1e3,
+                "visits": of_kind.visits,
+                "postures": of_kind.postures,
+            }
+            for kind, of_kind in least.items()
+        },
+    )
+
+
+def least_words(errors: Errors, least: Mapping[Kind, LeastError]) -> dict[Kind, str]:
+    """Return in words what exact parameters would leave of each mean error, and how that is known."""
+    return {kind: _least(spread.mean, kind, least[kind]) for kind, spread in _spreads(errors) if kind in least}
+
+
+def _least(mean: float, kind: Kind, least: LeastError) -> str:
+    figure, more = f"{least.mean * 1e3:.3f} {_UNITS[kind]}", "" if least.mean < mean else ", and no more was found"
+    if least.evidence == "visits":
+        seen = f"{counted(least.visits, 'visit')} to {counted(least.postures, 'posture')}"
+        return f"Noise and repeatability alone make a mean of {figure}, as {seen} show{more}."
+    if least.evidence == "declared":
+        return (
+            f"The declared noise alone makes a mean of {figure}{more}; repeatability is not in it (too few revisits)."
+        )
+    noise = "" if least.declared is None else f" The declared noise alone makes {least.declared * 1e3:.3f}."
+    return (
+        f"With exact parameters the mean would be {figure}, estimated from what the model leaves{more}. What the model "
+        f"cannot follow is in it; only revisits tell that from noise and repeatability.{noise}"
+    )
 
 
 def _expectation(of: Expectation, lower_bound: bool) -> dict[str, Any]:

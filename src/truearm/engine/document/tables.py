@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -271,18 +270,6 @@ def noise_table(fit: Fit) -> Table:
         unit, scale = _SIGMA_SHOWN[kind]
         rows.append((kind, Cell(f"{significant(sigma * scale, 3, 5)} {unit}", sigma * scale), _PER[kind], source))
     return Table(("reading", "standard deviation", "per", "source"), rows, texts=(2, 3))
-
-
-def noise_alone(fit: Fit, kind: str) -> str | None:
-    """Return the mean error that the noise of a reading alone would make, as printed; None where it is not known.
-
-    It is that of the norm of three normal coordinates, or of a single one: ``sqrt(8 / pi)`` or ``sqrt(2 / pi)``
-    standard deviations.
-    """
-    names = ("distance", "height") if kind == "length" else (kind,)
-    known = [fit.sigma[name] for name in names if name in fit.sigma]
-    share = math.sqrt(2.0 / math.pi) if kind == "length" else math.sqrt(8.0 / math.pi)
-    return significant(1e3 * share * max(known), 2) if known else None
 
 
 def noise_sentence(fit: Fit) -> str:

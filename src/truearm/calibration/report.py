@@ -57,6 +57,7 @@ from truearm.engine.document.tables import (
     spread_rows,
     spread_table,
     strongest_pairs,
+    untold,
 )
 from truearm.engine.robot.parts import GRAVITY
 
@@ -460,6 +461,7 @@ def _shares(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
 def _parameters(fit: Fit) -> Section:
     rows = parameter_rows(fit)
     own, frames = ([row for row in rows if (row.group in _FRAMES) is of_frames] for of_frames in (False, True))
+    idle, own = ([row for row in own if untold(fit, row) is so] for so in (True, False))
     words = (
         f"{parameter_sentence(rows)} Deviation is one standard deviation of the estimate. Informed is the share of the "
         "prior's variance that the readings removed: near 0 %, the value is its prior and was not measured (grey). "
@@ -481,7 +483,11 @@ def _parameters(fit: Fit) -> Section:
         "placement of the nominal robot."
     )
     summary = f"Base, targets and fixtures ({len(frames)} parameters)"
-    blocks += [parameters_table(own), Folded(summary, [Words(base, quiet=True), parameters_table(frames)])]
+    blocks.append(parameters_table(own))
+    if idle:
+        words = f"Joint effects of which the data tell next to nothing ({len(idle)} parameters)"
+        blocks.append(Folded(words, [parameters_table(idle)]))
+    blocks.append(Folded(summary, [Words(base, quiet=True), parameters_table(frames)]))
     return Section("Parameters", blocks, "parameters")
 
 

@@ -12,6 +12,7 @@ from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.conventions.convention import parallel_joints_without_beta
 from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
+from truearm.engine.robot.effects.effect import Effect
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.loads import has_weight
 
@@ -29,6 +30,11 @@ _LARGEST_UNINFORMED_SHARE: Final = 0.05
 NOT_CONVERGED: Final = Rule("not-converged", "error", "the solver's steps did not become small")
 RANK_LOSS: Final = Rule(
     "rank-loss", "error", "the training data do not determine some parameters, and predictions elsewhere depend on them"
+)
+PRIORS_DECIDE: Final = Rule(
+    "priors-decide",
+    "warning",
+    "of every effect at once: as `rank-loss`, but the priors say what the data do not, and the expected error holds it",
 )
 CLOSED_LOOP: Final = Rule(
     "closed-loop",
@@ -61,11 +67,15 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
     if fit.status is Status.NOT_CONVERGED:
         notices.append(NOT_CONVERGED(f"The fit did not converge. {Status.NOT_CONVERGED.advice}"))
     if fit.unobservable:
+        words = (
+            f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend on "
+            "them."
+        )
+        sound = fit.status is not Status.RANK_LOSS
         notices.append(
-            RANK_LOSS(
-                f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend "
-                f"on them. {Status.RANK_LOSS.advice}"
-            )
+            PRIORS_DECIDE(f"{words} Their values are what is known of any such robot, and so uncertain.")
+            if sound
+            else RANK_LOSS(f"{words} {Status.RANK_LOSS.advice}")
         )
     if fit.gauge_freedoms:
         words = (
@@ -108,12 +118,13 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
             )
         )
     notices += _check_effects(fit)
-    if fit.robot.effect_names:
-        effects = ", ".join(fit.robot.effect_names)
-        own = [p.name for effect in fit.robot.effects for p in effect.parameters]
+    told = [effect for effect in fit.robot.effects if not fit.model.weighed or _is_told(fit, effect)]
+    if told:
+        own = [p.name for effect in told for p in effect.parameters]
         notices.append(
             URDF_PARTIAL(
-                f"calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold {effects} "
+                "calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold "
+                f"{', '.join(effect.name for effect in told)} "
                 f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
                 "and the targets in the instrument's frame. calibrated.yaml holds everything."
             )
@@ -209,6 +220,11 @@ NEGATIVE_EFFECT: Final = Rule(
 EFFECTS_UNINFORMED: Final = Rule(
     "effects-uninformed", "warning", "parameters of joint effects that the data do not inform, by name", gravity=0
 )
+
+
+def _is_told(fit: Fit, effect: Effect) -> bool:
+    free = [p.name for p in effect.parameters if p.name in fit.free.names]
+    return any(fit.parameter_status(name) != "uninformed" for name in free)
 
 
 def _check_effects(fit: Fit) -> list[Notice]:

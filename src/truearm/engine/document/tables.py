@@ -229,21 +229,32 @@ def parameter_rows(fit: Fit) -> tuple[ParameterRow, ...]:
     return tuple(rows)
 
 
+def untold(fit: Fit, row: ParameterRow) -> bool:
+    """Return whether the data tell next to nothing of a parameter that a model with every effect has."""
+    return fit.model.weighed and row.group in fit.model.effects and row.fit_status == "uninformed"
+
+
 def parameter_lines(fit: Fit) -> list[str]:
-    """Return the parameters in columns: name, nominal, value, deviation, unit, and what the value is worth."""
+    """Return the parameters in columns: name, nominal, value, deviation, unit, and what the value is worth.
+
+    Those that :func:`untold` is about are counted.
+    """
     worth = {"identified": "", "at-bound": "at a bound", "uninformed": "not told by the data"}
     rows = [("parameter", "nominal", "value", "deviation", "unit", "")]
-    for row in parameter_rows(fit):
+    told = [row for row in parameter_rows(fit) if not untold(fit, row)]
+    for row in told:
         nominal = from_si(fit.robot.parameters[row.name].nominal, row.unit)
         status = worth.get(row.fit_status, row.fit_status.replace("-", " "))
         rows.append((row.name, row.fixed(nominal), row.known(row.estimate), row.deviation_text, row.unit, status))
     wide = [max(len(row[k]) for row in rows) for k in range(5)]
-    return [
+    lines = [
         "  ".join(
             [row[0].ljust(wide[0]), *(row[k].rjust(wide[k]) for k in (1, 2, 3)), row[4].ljust(wide[4]), row[5]]
         ).rstrip()
         for row in rows
     ]
+    more = len(parameter_rows(fit)) - len(told)
+    return [*lines, *([f"and {more} of joint effects of which the data tell next to nothing"] if more else [])]
 
 
 def strongest_pairs(fit: Fit) -> list[tuple[Cell, Cell, str]]:

@@ -333,7 +333,7 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
         status = Status.RANK_LOSS
     elif not solution.converged:
         status = Status.NOT_CONVERGED
-    elif unobservable:
+    elif unobservable and not model.weighed:
         status = Status.RANK_LOSS
     elif at_bound.any():
         status = Status.AT_BOUND

@@ -664,12 +664,9 @@ def parts_with_curves(
     whole, beforehand, informed = curve_covariance(of, variance, sure, expected)
     fitted = set(free.names)
     more = [name for name, on in zip(names, that_matter(of, variance).tolist(), strict=True) if on] if names else []
-    known = {curves.places[name][0] for name in fitted.intersection(names)}
-    more = [
-        name
-        for name in more
-        if name not in fitted and (curves.places[name][0] in known or not erring[curves.places[name][0]])
-    ]
+    own = {curves.places[name][0] for name in fitted.intersection(names)}
+    open_ = {i for i, errs in enumerate(erring.tolist()) if i in own or not errs}
+    more = [name for name in more if name not in fitted and curves.places[name][0] in open_]
     order = [place[name] for name in (*free.names, *more)]
     size = np.concatenate([[p.prior for p in others], np.ones(len(names))])[order]
     if scatter is None:

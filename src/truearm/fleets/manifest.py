@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BaseModel, Field, PlainValidator
 
 from truearm.calibration.calibrate import Calibrate
+from truearm.engine.command.groups import OfModel
 from truearm.engine.base.errors import InputError, name_parameter, name_place, refusals_at
 from truearm.engine.base.files import read_bytes, read_yaml
 from truearm.engine.base.limits import refuse_beyond
@@ -126,7 +127,7 @@ class ExperimentFile(BaseModel):
     count: Count
     configurations: Configurations = 20
     targets: Annotated[int, Field(ge=1, le=8, strict=True)] = 1
-    model: str = Calibrate.default("model")
+    model: str = OfModel.default("model")
     noise: NotNegative
     held_out: Count = 50
     seed: Annotated[int, Field(ge=0, strict=True)] = Calibrate.default("seed")

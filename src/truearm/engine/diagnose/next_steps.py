@@ -124,17 +124,12 @@ def other_model(fit: Fit, candidate: Explanation, known: float) -> NextStep:
     if candidate.cause == LOADS:
         words = (
             f"Joints that give way explain {share} of what is left, but the robot has no masses: give masses in the "
-            "robot file or what it carried (`payload`), and use `model=elastic`."
+            "robot file or what it carried (`payload`)."
         )
         return NextStep("give-loads", words, gain)
     if candidate.cause == GEOMETRY:
         words = f"Use `model=geometric`: free geometry and joint zeros explain {share} of what is left."
         return NextStep("other-model", words, gain)
-    plain = "geometry" in fit.model.groups and not fit.model.effects
-    if candidate.cause == "compliance" and plain:
-        return NextStep(
-            "other-model", f"Use `model=elastic`: joints that give way explain {share} of what is left.", gain
-        )
     if candidate.cause == Fourier.name:
         words = (
             f"Add `effects={candidate.cause}`, or `effects={JointCurve.name}`, which contains it and is found from "
@@ -258,8 +253,8 @@ def steps_after_check(
         steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
     elif not any(step.code in ("other-model", "give-loads") for step in steps):
         explainable = left is not None and can_explain(left)
-        also = ": no joint effect would explain more of the readings" if explainable else ""
-        steps.append(NextStep("calibrate", f"Calibrate with `model=geometric`{also}."))
+        also = " No joint effect would explain more of the readings." if explainable else ""
+        steps.append(NextStep("calibrate", f"Calibrate.{also}"))
     return most_useful_first(steps)
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from pydantic import BaseModel, Field, PlainValidator
 
 from truearm.calibration.calibrate import Calibrate
-from truearm.engine.command.groups import OfModel
 from truearm.engine.base.errors import InputError, name_parameter, name_place, refusals_at
 from truearm.engine.base.files import read_bytes, read_yaml
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.units import sized_si
+from truearm.engine.command.groups import OfModel
 from truearm.engine.data.controller_joints import in_model_joints
 from truearm.engine.data.readers.canonical import read_csv
 from truearm.engine.fit.models import named_model

@@ -56,7 +56,7 @@ class MadeWith:
         """
         found: dict[str, tuple[object, object]] = {}
         if settings.model is not None or not self.by_default:
-            found["model"] = (self.model, settings.model or "the one by default")
+            found["model"] = (self.model, settings.model or "by default")
         if self.data is not None:
             found["training part"] = (self.train, self._trained(settings.train))
             found["seed"] = (self.seed, settings.seed)

@@ -262,6 +262,8 @@ def _read(asked: Calibrate, zones: WantedZones | None) -> _Read:
     source = urdf_source(asked.robot) if isinstance(asked.robot, str | Path) else None
     urdf = None if source is None else read_bytes(source[0])
     robot = asked.loads.on(robot_argument(asked.robot))
+    with refusals_of("effects"):
+        refuse_balancers_that_are_not_there(robot, asked.effects)
     asked.progress("reading the data")
     as_read = readings_argument(robot, asked.data)
     sha256 = None
@@ -285,7 +287,6 @@ def _model(asked: Calibrate, robot: Robot, training: Dataset) -> tuple[Model | N
     model = MODELS[name]
     if model is not None and asked.effects:
         with refusals_of("effects"):
-            refuse_balancers_that_are_not_there(robot, asked.effects)
             model = model.also(asked.effects)
             model.free(model.prepared(robot))
     return model, because

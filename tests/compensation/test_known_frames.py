@@ -69,7 +69,7 @@ def calibrated_holding(hold: list[str], folder: Path, robot: str = "irb120", **m
     if key not in _CALIBRATED:
         twin, data = exact(robot)
         frames = frames_of(twin.robot, folder / "frames.yaml")
-        _CALIBRATED[key] = calibrate(robot, data, hold=hold, frames=frames, **more, model="geometric")
+        _CALIBRATED[key] = calibrate(robot, data, hold=hold, frames=frames, **{"model": "geometric", **more})
     return _CALIBRATED[key]
 
 
@@ -282,7 +282,7 @@ def test_holds_that_do_not_go_with_the_rest_are_refused(tmp_path: Path) -> None:
     )
     for value, words in cases:
         with pytest.raises(InputError, match=words):
-            calibrate("irb120", exact()[1], **value, model="geometric")
+            calibrate("irb120", exact()[1], **{"model": "geometric", **value})
 
 
 def test_what_readings_of_fixtures_cannot_hold_is_refused(tmp_path: Path) -> None:

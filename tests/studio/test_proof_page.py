@@ -141,7 +141,7 @@ def test_a_result_whose_history_is_written_otherwise_is_shown_with_what_it_says(
     content = file.read_text().replace('"name": "offsets",', '"name": "offsets", "because": "loads are known",')
     file.write_text(content)
     window._reload()
-    assert "other-" not in proof_of(window)._now.content
+    assert "Chosen now: model" not in proof_of(window)._now.content
 
 
 def test_an_edited_robot_of_the_same_name_is_another_robot(window: Window) -> None:

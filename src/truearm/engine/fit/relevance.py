@@ -45,6 +45,8 @@ _LEAST: Final = 1e-3
 _MOST: Final = 3.0
 _STEPS: Final = 60
 _SETTLED: Final = 0.02
+#: Share of the equations that is rounding: noise is no smaller.
+_ROUNDING: Final = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +156,10 @@ def _climbed(
     noise = 1.0
     for _ in range(_STEPS):
         root = np.sqrt(variance)[group]
-        H = root[:, None] * A * root / noise + np.eye(len(root))
+        scaled = root[:, None] * A * root
+        least = _ROUNDING * float(np.trace(scaled))
+        noise = max(noise, least)
+        H = scaled / noise + np.eye(len(root))
         inverse = np.linalg.inv(np.linalg.cholesky(H))
         half = inverse @ (root * b) / noise
         w = root * (inverse.T @ half)
@@ -167,7 +172,7 @@ def _climbed(
         new = np.clip(new, _LEAST**2, _MOST**2)
         if noisy:
             rest = squares - 2.0 * float(b @ w) + float(w @ A @ w)
-            noise = max(rest, 1e-6 * squares) / max(rows - known.sum(), 0.1 * rows)
+            noise = max(max(rest, 1e-6 * squares) / max(rows - known.sum(), 0.1 * rows), least)
         change = np.abs(np.log(new / variance)).max(initial=0.0)
         variance = new
         if change < _SETTLED:

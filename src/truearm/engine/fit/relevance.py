@@ -16,7 +16,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.fit.curves import NO_CURVES, CurveMoments, curve_moments, moments_without
+from truearm.engine.fit.curves import NO_CURVES, ROUNDING, CurveMoments, curve_moments, moments_without
 from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.compliance import Compliance
@@ -45,8 +45,6 @@ _LEAST: Final = 1e-3
 _MOST: Final = 3.0
 _STEPS: Final = 60
 _SETTLED: Final = 0.02
-#: Share of the equations that is rounding: noise is no smaller.
-_ROUNDING: Final = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +155,7 @@ def _climbed(
     for _ in range(_STEPS):
         root = np.sqrt(variance)[group]
         scaled = root[:, None] * A * root
-        least = _ROUNDING * float(np.trace(scaled))
+        least = ROUNDING * float(np.trace(scaled))
         noise = max(noise, least)
         H = scaled / noise + np.eye(len(root))
         inverse = np.linalg.inv(np.linalg.cholesky(H))

@@ -90,7 +90,7 @@ def judged(
     repeatability: float = 0.0,
     poses: int = POSES,
 ) -> list[float]:
-    """Calibrate one robot, whose joints repeat to so many degrees, as `truearm calibrate` does.
+    """Calibrate one robot, whose joints repeat to so many degrees, as `truearm calibrate --model geometric` does.
 
     Returns true, expected, lowest, highest and held-out error [mm], 1 for a warning of narrow data and 2 for an error,
     and 1 if the fit converged.

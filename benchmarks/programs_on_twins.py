@@ -67,7 +67,7 @@ def one(seed: int) -> dict[str, Any]:
     size = float(rng.choice([0.3, 1.0, 1.0, 3.0]))
     worn, measured = bool(rng.integers(2)), bool(rng.integers(2))
     twin = drawn(robot, size, worn, rng)
-    calibration = truearm.calibrate(robot, campaign(twin, kind, rng), train="all")
+    calibration = truearm.calibrate(robot, campaign(twin, kind, rng), train="all", model="geometric")
     made: dict[str, Any] = {"robot": robot.name, "campaign": kind, "size": size, "worn": worn, "measured": measured}
     made |= {"status": calibration.status.value}
     with tempfile.TemporaryDirectory() as folder:

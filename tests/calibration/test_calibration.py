@@ -28,7 +28,7 @@ from truearm.engine.fit.fit import Status
 @cache
 def run(train: int | None = None) -> Calibration:
     _, data = campaign("irb120", 40, 0.05e-3, 1)
-    return package.calibrate("irb120", data, train="all" if train is None else train)
+    return package.calibrate("irb120", data, train="all" if train is None else train, model="geometric")
 
 
 def test_residuals_are_the_errors_reading_by_reading() -> None:
@@ -137,7 +137,7 @@ def test_the_error_to_expect_stands_beside_the_held_out_one() -> None:
 def test_a_split_made_apart_finds_the_same() -> None:
     data = campaign("irb120", 40, 0.05e-3, 1)[1]
     training, judging = data.split(0.7, seed=0)
-    apart = package.calibrate("irb120", training, train="all")
+    apart = package.calibrate("irb120", training, train="all", model="geometric")
     assert apart.parameters["a_3"].value == run(28).parameters["a_3"].value
     held_out = known(package.validate(apart.robot, judging).errors.position)
     assert held_out.mean == pytest.approx(known(known(run(28).validation).position).mean, rel=1e-12)

@@ -247,9 +247,9 @@ def test_a_robot_calibrated_with_its_temperature_asks_for_it(truearm: Truearm, d
     truearm("convert", "irb120", "--convention", "modified-hayati", "--out", robot)
     robot.write_text(robot.read_text() + "effects: [thermal-growth]\n")
     assert "the effect thermal-growth needs the temperature of the arm" in refused(
-        truearm, "calibrate", robot, data, "--out", tmp_path / "out"
+        truearm, "calibrate", robot, data, "--out", tmp_path / "out", "--model=geometric"
     )
-    assert truearm("calibrate", robot, tmp_path / "warm.csv", "--out", tmp_path / "out").code == 0
+    assert truearm("calibrate", robot, tmp_path / "warm.csv", "--out", tmp_path / "out", "--model=geometric").code == 0
     message = refused(truearm, "validate", tmp_path / "out" / "calibrated.yaml", data)
     assert "the robot was calibrated with its temperature, and the data hold no temperature" in message
     assert "Add the column temperature [degC]" in message

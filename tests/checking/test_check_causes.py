@@ -179,7 +179,7 @@ def test_without_a_robot_distances_tell_rows_in_another_unit() -> None:
 
 def test_honest_data_have_no_error() -> None:
     for robot, poses in (("irb120", 30), ("ur10", 12), ("katana450", 30), ("li3", 20)):
-        run = calibrate(robot, campaign(robot, poses, 0.05e-3, 8)[1])
+        run = calibrate(robot, campaign(robot, poses, 0.05e-3, 8)[1], model="geometric")
         assert run.finished, robot
         assert not [n for n in run.warnings if n.level == "error"], robot
 
@@ -187,7 +187,7 @@ def test_honest_data_have_no_error() -> None:
 def test_an_unmastered_robot_is_the_robot() -> None:
     data = honest()
     off = np.radians(5.0) * np.array([1, -1, 1, 1, -1, 1])
-    run = calibrate(ROBOT, replace(data, joints=data.joints + off))
+    run = calibrate(ROBOT, replace(data, joints=data.joints + off), model="geometric")
     assert run.status is Status.CONVERGED
     assert not [n for n in run.warnings if n.level == "error"]
     assert "enter wider priors" in next(n.message for n in run.warnings if n.code == "far-from-nominal")
@@ -240,7 +240,7 @@ def test_joint_positions_that_belong_to_no_row_are_told_and_not_their_readings()
 def test_a_robot_is_not_another_one_because_of_one_wrong_row() -> None:
     joints = honest().joints.copy()
     joints[3, 2] += 0.2
-    found_codes = {n.code for n in calibrate(ROBOT, replace(honest(), joints=joints)).warnings}
+    found_codes = {n.code for n in calibrate(ROBOT, replace(honest(), joints=joints), model="geometric").warnings}
     assert ("joints-mistaken" in found_codes, "wrong-robot" in found_codes) == (True, False)
 
 

@@ -234,7 +234,7 @@ def test_the_program_of_a_path_is_remembered(tmp_path: Path) -> None:
 
 
 def test_what_stays_by_its_name_is_said_not_to_be_in_the_errors(program: Path) -> None:
-    robot = truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, 8)[1]).robot
+    robot = truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, 8)[1], model="geometric").robot
     words = "  Targets that stay because of `keep` or `only` are not in these errors."
     assert words in compensate(robot, [program], keep=["pHole3"]).lines()
     assert words not in compensate(robot, [program]).lines()

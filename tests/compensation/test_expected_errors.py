@@ -40,7 +40,7 @@ SOME = ("pHole1", "pHole6", "pHole8")
 @pytest.fixture(scope="module")
 def robot() -> Robot:
     """A robot calibrated with so few configurations that half a millimetre is left uncertain."""
-    result = calibrate("irb120", campaign("irb120", 7, 5e-5, 4)[1], train="all").robot
+    result = calibrate("irb120", campaign("irb120", 7, 5e-5, 4)[1], train="all", model="geometric").robot
     assert result.proof is not None
     return result
 

@@ -69,7 +69,7 @@ def calibrated_holding(hold: list[str], folder: Path, robot: str = "irb120", **m
     if key not in _CALIBRATED:
         twin, data = exact(robot)
         frames = frames_of(twin.robot, folder / "frames.yaml")
-        _CALIBRATED[key] = calibrate(robot, data, hold=hold, frames=frames, **more)
+        _CALIBRATED[key] = calibrate(robot, data, hold=hold, frames=frames, **{"model": "geometric", **more})
     return _CALIBRATED[key]
 
 
@@ -135,7 +135,7 @@ def test_the_base_stays_known_when_the_robot_is_placed_anew(tmp_path: Path) -> N
     elsewhere = calibrate(first.robot, exact()[1], model="frames")
     assert elsewhere.robot.proof is not None
     assert elsewhere.robot.proof.held == ("base", "flange")
-    assert calibrate(first.robot, exact()[1]).robot.proof.held == ()  # type: ignore[union-attr]
+    assert calibrate(first.robot, exact()[1], model="geometric").robot.proof.held == ()  # type: ignore[union-attr]
 
 
 def test_no_base_and_no_flange_is_assumed_in_programs_where_they_were_held(tmp_path: Path) -> None:
@@ -170,18 +170,22 @@ def test_a_tool_point_that_was_held_stays_on_the_flange_in_programs(tmp_path: Pa
 
 def test_a_base_that_is_elsewhere_contradicts_the_readings(tmp_path: Path) -> None:
     twin, data = noisy()
-    right = calibrate("irb120", data, hold=["base"], frames=frames_of(twin.robot, tmp_path / "a.yaml"))
+    right = calibrate(
+        "irb120", data, hold=["base"], frames=frames_of(twin.robot, tmp_path / "a.yaml"), model="geometric"
+    )
     assert "hold-contradicts" not in {n.code for n in right.warnings}
     wrong = frames_of(twin.robot, tmp_path / "b.yaml", base=(2.0, 0.0, 0.0))
     for redundancy in ("prior", "drop"):
-        result = calibrate("irb120", data, hold=["base", "targets"], frames=wrong, redundancy=redundancy)
+        result = calibrate(
+            "irb120", data, hold=["base", "targets"], frames=wrong, redundancy=redundancy, model="geometric"
+        )
         (notice,) = [n for n in result.warnings if n.code == "hold-contradicts"]
         assert notice.level == "error"
         assert re.search(r"with them the fit leaves \S+ mm .* with all of them found 0\.08\d* mm", notice.message)
         assert not result.finished
     # A height that only another robot could have goes whole into d_1, and no reading is off.
     wrong = frames_of(twin.robot, tmp_path / "b.yaml", base=(0.0, 0.0, 12.0))
-    result = calibrate("irb120", data, hold=["base"], frames=wrong)
+    result = calibrate("irb120", data, hold=["base"], frames=wrong, model="geometric")
     (notice,) = [n for n in result.warnings if n.code == "hold-contradicts"]
     assert re.search(r"found from the readings, the base is 1\d\.\d mm", notice.message)
 
@@ -193,7 +197,12 @@ def test_a_moved_base_and_held_targets_go_together(tmp_path: Path) -> None:
     position[numbered.configuration >= 15] += [2e-3, 0.0, 1e-3]
     frames = frames_of(twin.robot, tmp_path / "frames.yaml")
     result = calibrate(
-        "irb120", replace(numbered, position=position), hold=["base", "targets"], frames=frames, base_changes=["16"]
+        "irb120",
+        replace(numbered, position=position),
+        hold=["base", "targets"],
+        frames=frames,
+        base_changes=["16"],
+        model="geometric",
     )
     assert apart(result.robot, twin.robot) < 0.3e-3
 
@@ -273,7 +282,7 @@ def test_holds_that_do_not_go_with_the_rest_are_refused(tmp_path: Path) -> None:
     )
     for value, words in cases:
         with pytest.raises(InputError, match=words):
-            calibrate("irb120", exact()[1], **value)
+            calibrate("irb120", exact()[1], **{"model": "geometric", **value})
 
 
 def test_what_readings_of_fixtures_cannot_hold_is_refused(tmp_path: Path) -> None:
@@ -295,7 +304,7 @@ def test_a_robot_in_its_own_frame_takes_the_place_of_a_target_from_its_file(tmp_
     tool = calibrated_holding(["base"], tmp_path, model="frames")  # a tool alone, in a base that is known
     assert set(tool.fit.free.names) == {f"target_{n}_{a}" for n in "123" for a in "xyz"}
     path = cell_file(tmp_path / "t.yaml", {n: {"of": "flange", "target": n} for n in "123"}, {})
-    result = calibrate(tool.robot, exact()[1], hold=["targets"], frames=path)
+    result = calibrate(tool.robot, exact()[1], hold=["targets"], frames=path, model="geometric")
     for name in ("target_1_x", "target_2_y", "target_3_z"):
         assert result.robot.values[name] == tool.robot.values[name]
 
@@ -305,7 +314,7 @@ def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(csv_text(data))
     frames_of(twin.robot, tmp_path / "frames.yaml")
     words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--hold", "base, 1", "--hold", "2"]
-    words += ["--out", str(tmp_path / "out")]
+    words += ["--model=geometric", "--out", str(tmp_path / "out")]
     outcome = CliRunner().invoke(program(), [*words, "--details", "--frames", str(tmp_path / "frames.yaml")])
     assert outcome.exit_code == 0, outcome.output
     assert "Held at known places: base, target 1, target 2" in outcome.output
@@ -324,13 +333,13 @@ def test_a_held_base_that_the_arm_makes_up_for_is_told(tmp_path: Path) -> None:
     twin = truth_twin(robot, "nominal", rng)
     data = measure(twin, robot.random_configurations(40, rng), 0.03e-3, rng)
     frames = frames_of(twin.robot, tmp_path / "frames.yaml")
-    right = calibrate(robot, data, hold=["base", "targets"], frames=frames)
+    right = calibrate(robot, data, hold=["base", "targets"], frames=frames, model="geometric")
     assert "hold-strained" not in {n.code for n in right.warnings}
     along_x = twin.robot.base.rotation @ [3e-3, 0.0, 0.0]
     moved = twin.robot.with_values(
         {f"base_{axis}": twin.robot.values[f"base_{axis}"] + float(v) for axis, v in zip("xyz", along_x, strict=True)}
     )
-    wrong = calibrate(robot, data, hold=["base", "targets"], frames=frames_of(moved, frames))
+    wrong = calibrate(robot, data, hold=["base", "targets"], frames=frames_of(moved, frames), model="geometric")
     (notice,) = [n for n in wrong.warnings if n.code == "hold-strained"]
     assert notice.level == "warning"
     assert "a_1 (" in notice.message

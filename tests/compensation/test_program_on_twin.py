@@ -319,7 +319,7 @@ def far_from_the_plate(seed: int) -> tuple[Twin, Calibration]:
     middle = np.radians([130, -70, 40, rng.uniform(-120, 120), rng.uniform(-90, 90), 90])
     half = np.radians(3)
     return twin, truearm.calibrate(
-        "irb120", measure(twin, rng.uniform(middle - half, middle + half, (60, 6)), FINE, rng)
+        "irb120", measure(twin, rng.uniform(middle - half, middle + half, (60, 6)), FINE, rng), model="geometric"
     )
 
 
@@ -387,7 +387,7 @@ def test_three_configurations_correct_nothing(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     twin = truth_twin(load_robot("irb120"), "random", rng)
     calibration = truearm.calibrate(
-        "irb120", measure(twin, twin.robot.random_configurations(3, rng), FINE, rng), train="all"
+        "irb120", measure(twin, twin.robot.random_configurations(3, rng), FINE, rng), train="all", model="geometric"
     )
     with pytest.raises(InputError, match="got 'rank-loss'"):
         on_the_plate(twin, calibration, tmp_path)

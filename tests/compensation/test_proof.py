@@ -28,7 +28,7 @@ SIGNS = Notice("joint-sign", "Joint 6 turns the other way.", "error")
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    return truearm.calibrate("irb120", campaign("irb120", 20, 2e-5, 1)[1]).robot
+    return truearm.calibrate("irb120", campaign("irb120", 20, 2e-5, 1)[1], model="geometric").robot
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def test_a_warning_that_concerns_programs_is_repeated_and_refuses_nothing(robot:
     # A calibration keeps the doubt about its nominal values.
     data = campaign("irb120", 20, 2e-5, 1)[1]
     off = replace(data, joints=data.joints + np.radians([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
-    result = truearm.calibrate("irb120", off).robot
+    result = truearm.calibrate("irb120", off, model="geometric").robot
     for arm in (result, truearm.calibrate(result, off, model="frames").robot):
         assert codes(compensate(arm, [program]))["far-from-nominal"] == "note"
 

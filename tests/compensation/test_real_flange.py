@@ -85,7 +85,7 @@ def cell(seed: int) -> Cellful:
     poses = base @ flange(arm, joints)
     seen = np.stack([(poses @ [*target, 1.0])[:, :3] for target in on_flange], axis=1)
     data = Dataset.of(joints, seen + rng.normal(0.0, 3e-5, seen.shape))
-    return Cellful(arm, base, on_flange[0], calibrate("irb120", data, train="all").robot)
+    return Cellful(arm, base, on_flange[0], calibrate("irb120", data, train="all", model="geometric").robot)
 
 
 def program(spread: float, rng: np.random.Generator) -> str:
@@ -182,7 +182,7 @@ def test_notices_say_that_the_tool_is_not_known() -> None:
 def test_the_flange_is_as_uncertain_as_the_arm_is_found_to_be_inaccurate() -> None:
     nominal = load_robot("irb120")
     # Priors are 1 mm and 0.1 deg. A robot as inaccurate as them, and one of which nothing is known:
-    robot = calibrate("irb120", campaign("irb120", 40, 2e-5, 3)[1], train="all").robot
+    robot = calibrate("irb120", campaign("irb120", 40, 2e-5, 3)[1], train="all", model="geometric").robot
     prior = np.array([1e-3, 1e-3, 2e-3, *np.radians([0.1, 0.1, 0.2])]) / math.sqrt(2.0)
     spread = np.diag(flange_spread(robot)) / prior
     assert (np.abs(np.log(spread)) < math.log(2.0)).all()
@@ -193,7 +193,7 @@ def test_the_flange_is_as_uncertain_as_the_arm_is_found_to_be_inaccurate() -> No
 
 
 def test_a_target_that_was_held_stays_where_it_is_on_the_real_flange() -> None:
-    robot = calibrate("irb120", campaign("irb120", 40, 2e-5, 3)[1], train="all").robot
+    robot = calibrate("irb120", campaign("irb120", 40, 2e-5, 3)[1], train="all", model="geometric").robot
     assert robot.proof is not None
     axes = [f"target_1_{axis}" for axis in "xyz"]
     edited = replace(robot, proof=replace(robot.proof, held=tuple(axes)))

@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @cache
 def calibrated(given: str, folder: Path) -> Told:
-    return told("calibrate", given, folder / "data.csv", "--out", folder / given)
+    return told("calibrate", given, folder / "data.csv", "--out", folder / given, "--model=geometric")
 
 
 def test_readings_of_a_ur10e_are_not_those_of_a_ur10(folder: Path) -> None:

@@ -73,7 +73,7 @@ def with_entry_errors(data: Dataset, count: int) -> Dataset:
 @pytest.mark.parametrize(("targets", "share"), [(3, 0.05), (2, 0.5), (3, 0.5)])
 def test_exchanged_reflectors_are_an_error(targets: int, share: float, tmp_path: Path) -> None:
     file = written(tmp_path, swapped(large_arm(targets), share))
-    found = told("calibrate", "kr210_r2700", file, "--out", tmp_path / "out")
+    found = told("calibrate", "kr210_r2700", file, "--out", tmp_path / "out", "--model=geometric")
     assert found.summary["validation"]["position_mm"]["mean"] > 1.0
     assert found.code == 3
     assert found.says("targets-swapped", "error", "is target (A|B)"), found
@@ -100,13 +100,13 @@ def test_where_every_row_has_them_nothing_is_wrong(tmp_path: Path) -> None:
 
 def test_a_robust_loss_is_not_pulled_by_exchanged_names(tmp_path: Path) -> None:
     file = written(tmp_path, swapped(large_arm(3), 0.05))
-    found = told("calibrate", "kr210_r2700", file, "--out", tmp_path / "out", "--loss", "cauchy")
+    found = told("calibrate", "kr210_r2700", file, "--out", tmp_path / "out", "--loss", "cauchy", "--model=geometric")
     assert (found.code, found.levels["targets-swapped"]) == (0, "warning")
 
 
 def test_a_fit_that_is_worse_than_the_nominal_robot_is_an_error(tmp_path: Path) -> None:
     file = written(tmp_path, with_entry_errors(small_arm("nominal"), 5))
-    found = told("calibrate", "irb120", file, "--out", tmp_path / "out")
+    found = told("calibrate", "irb120", file, "--out", tmp_path / "out", "--model=geometric")
     assert found.code == 3
     assert found.says("worse-than-nominal", "error", r"1 %\)"), found
     program = tmp_path / "plate.mod"
@@ -156,7 +156,7 @@ def state(folder: Path) -> dict[str, str]:
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a sound result, which stays as it is."""
     folder = tmp_path_factory.mktemp("sound") / "result"
-    assert package.calibrate("irb120", small_arm(), out=folder).faults == ()
+    assert package.calibrate("irb120", small_arm(), out=folder, model="geometric").faults == ()
     return folder
 
 
@@ -181,7 +181,7 @@ def test_a_bad_result_does_not_replace_a_sound_one(name: str, sound: Path, truea
 def test_python_hands_out_the_result_that_was_not_written(sound: Path, tmp_path: Path) -> None:
     before = state(sound)
     with pytest.raises(ResultKeptError, match=r"another `out`, or .* with `replace`") as refusal:
-        package.calibrate("irb120", bad("six"), out=sound)
+        package.calibrate("irb120", bad("six"), out=sound, model="geometric")
     kept = refusal.value.result
     assert kept.faults[0] == "rank-loss"
     assert refusal.value.parameter == "out"
@@ -211,7 +211,7 @@ def test_the_robot_file_alone_says_that_a_result_is_sound(sound: Path, tmp_path:
     shutil.copytree(sound, tmp_path / "out")
     (tmp_path / "out" / "result.json").unlink()
     with pytest.raises(ResultKeptError, match=r"in the folder: converged[.]"):
-        package.calibrate("irb120", bad("six"), out=tmp_path / "out")
+        package.calibrate("irb120", bad("six"), out=tmp_path / "out", model="geometric")
 
 
 @pytest.mark.parametrize(("told_then", "stays"), [((), True), (("not-better",), False), (("no-loads",), True)])
@@ -224,14 +224,14 @@ def test_a_result_of_an_earlier_version_without_a_proof(
     before = state(tmp_path)
     if stays:
         with pytest.raises(ResultKeptError):
-            package.calibrate("irb120", bad("six"), out=tmp_path)
+            package.calibrate("irb120", bad("six"), out=tmp_path, model="geometric")
     else:
-        package.calibrate("irb120", bad("six"), out=tmp_path)
+        package.calibrate("irb120", bad("six"), out=tmp_path, model="geometric")
     assert (state(tmp_path) == before) is stays
 
 
 def test_a_damaged_result_is_refused_as_it_was(tmp_path: Path) -> None:
-    package.calibrate("irb120", small_arm(), out=tmp_path)
+    package.calibrate("irb120", small_arm(), out=tmp_path, model="geometric")
     (tmp_path / "result.json").write_text("{")
     with pytest.raises(package.InputError, match="has been changed since"):
         package.calibrate("irb120", bad("six"), out=tmp_path, replace=True)

@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def calibrated(half_width: float | None, folder: Path) -> Told:
     """Return what calibration says; its folder is named after the width."""
     file = written(folder, made(half_width)[1], f"{half_width}.csv")
-    return told("calibrate", "irb120", file, "--out", folder / str(half_width))
+    return told("calibrate", "irb120", file, "--out", folder / str(half_width), "--model=geometric")
 
 
 def true_error(half_width: float | None, folder: Path) -> float:
@@ -101,13 +101,22 @@ def test_a_model_without_geometry_says_so_too(model: str, folder: Path) -> None:
 def test_a_payload_in_grams(folder: Path) -> None:
     file = written(folder, made(None)[1])
     for mass, said in (("2700kg", True), ("2.7kg", False)):
-        found = told("calibrate", "irb120", file, "--payload", f"{mass},0mm,0mm,100mm", "--out", folder / mass)
+        found = told(
+            "calibrate",
+            "irb120",
+            file,
+            "--payload",
+            f"{mass},0mm,0mm,100mm",
+            "--out",
+            folder / mass,
+            "--model=geometric",
+        )
         assert found.says("payload-unlikely", "warning", "grams called kilograms") is said, found
 
 
 def test_another_robot_is_not_this_one(folder: Path) -> None:
     file = written(folder, made(None)[1])
-    found = told("calibrate", "lrmate200ic", file, "--out", folder / "lrmate")
+    found = told("calibrate", "lrmate200ic", file, "--out", folder / "lrmate", "--model=geometric")
     assert found.code == 3
     assert found.summary["status"] == "implausible"
     assert found.says("implausible", "error")
@@ -116,7 +125,7 @@ def test_another_robot_is_not_this_one(folder: Path) -> None:
 
 def test_three_configurations_determine_no_robot(folder: Path) -> None:
     file = written(folder, made(None)[1])
-    found = told("calibrate", "irb120", file, "--train", 3, "--out", folder / "three")
+    found = told("calibrate", "irb120", file, "--train", 3, "--out", folder / "three", "--model=geometric")
     assert found.code == 3
     assert found.says("rank-loss", "error")
 
@@ -155,13 +164,20 @@ def test_intervals_hold_where_targets_share_the_error_of_the_joints(repeatabilit
 
 def test_joints_with_one_decimal_are_as_uncertain_as_that() -> None:
     _, data = of_many_targets(5, 0.0, 1)
-    calibration = truearm.calibrate("irb120", data)
+    calibration = truearm.calibrate("irb120", data, model="geometric")
     assert np.degrees(calibration.fit.joint_error) == pytest.approx(np.full(6, 0.1 / np.sqrt(12.0)), rel=0.3)
     assert "errors of the joints of 0.0" in "\n".join(calibration.lines())
 
 
 def test_the_error_of_the_joints_is_one_of_a_kind_of_joint(tmp_path: Path) -> None:
-    told("calibrate", "irb120", written(tmp_path, of_many_targets(0, 0.02)[1]), "--out", tmp_path / "out")
+    told(
+        "calibrate",
+        "irb120",
+        written(tmp_path, of_many_targets(0, 0.02)[1]),
+        "--out",
+        tmp_path / "out",
+        "--model=geometric",
+    )
     (of_all,) = json.loads((tmp_path / "out" / "result.json").read_text())["noise"]["joint_error"]
     assert (of_all["kind"], of_all["joints"], of_all["unit"]) == ("revolute", [1, 2, 3, 4, 5, 6], "deg")
     assert of_all["deviation"] == pytest.approx(0.02, abs=0.004)
@@ -203,10 +219,10 @@ def test_a_robot_that_changed_is_beyond_its_proof(folder: Path) -> None:
 def test_a_second_calibration_with_the_same_data_proves_nothing(folder: Path) -> None:
     calibrated(None, folder)
     robot = folder / "None" / "calibrated.yaml"
-    again = told("calibrate", robot, folder / "None.csv", "--seed", 1, "--out", folder / "again")
+    again = told("calibrate", robot, folder / "None.csv", "--seed", 1, "--out", folder / "again", "--model=geometric")
     assert again.says("training-data", "warning", "held.out"), again
     fresh = written(folder, more_of(made(None)[0], 30, NOISE, 6), "later.csv")
-    assert "training-data" not in told("calibrate", robot, fresh, "--out", folder / "later").levels
+    assert "training-data" not in told("calibrate", robot, fresh, "--out", folder / "later", "--model=geometric").levels
 
 
 def test_targets_that_took_other_names(folder: Path) -> None:

@@ -81,7 +81,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
     folder.mkdir()
     twin, data = campaign("irb120", 60, NOISE, 3)
     for name, readings in (("first", data), ("second", more_of(twin, 60, NOISE, 4))):
-        truearm.calibrate("irb120", readings, out=folder / name)
+        truearm.calibrate("irb120", readings, out=folder / name, model="geometric")
     (folder / "plate.mod").write_text(PLATE)
     place = (
         twin.robot.base.matrix @ best_agreement(twin.robot)[0] @ read(folder / "plate.mod").frames["wobjPlate"].matrix

@@ -119,7 +119,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def test_pendant_readings_calibrate_to_the_same_figure_as_the_models_joints(files: dict[str, Path]) -> None:
-    pendant, model = (truearm.calibrate(ROBOT, files[name], train=28) for name in ("pendant", "model"))
+    pendant, model = (
+        truearm.calibrate(ROBOT, files[name], train=28, model="geometric") for name in ("pendant", "model")
+    )
     assert pendant.validation is not None
     assert model.validation is not None
     assert pendant.validation.position is not None
@@ -152,7 +154,7 @@ def test_joints_under_the_wrong_name_are_named(files: dict[str, Path], name: str
 
 
 def test_a_calibration_is_validated_with_pendant_readings(files: dict[str, Path], tmp_path: Path) -> None:
-    truearm.calibrate(ROBOT, files["pendant"], train="all", out=tmp_path / "result")
+    truearm.calibrate(ROBOT, files["pendant"], train="all", out=tmp_path / "result", model="geometric")
     shown = readings(10, 2)
     new = {
         "axis": campaign(tmp_path / "axis.csv", shown, shown, AXES),

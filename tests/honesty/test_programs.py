@@ -35,7 +35,9 @@ def robot(name: str, folder: Path) -> Path:
         rng = np.random.default_rng(8)
         middle = np.array([-140.0, -60.0, -60.0, -100.0, -80.0, 300.0])
         data = measure(twin, np.radians(middle + rng.uniform(-1.0, 1.0, (40, 6))), NOISE, rng)
-    told("calibrate", "irb120", written(folder, data, f"{name}.csv"), *words, "--out", folder / name)
+    told(
+        "calibrate", "irb120", written(folder, data, f"{name}.csv"), *words, "--out", folder / name, "--model=geometric"
+    )
     return folder / name / "calibrated.yaml"
 
 

@@ -71,7 +71,7 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
     result = json.loads((out / "result.json").read_text())
     assert {k: result[k] for k in summary} == summary
     assert result["truearm"] == "truearm-result/1"
-    assert package.calibrate("irb120", package.load_data(small / "data.csv")).summary() == summary
+    assert package.calibrate("irb120", package.load_data(small / "data.csv"), model="geometric").summary() == summary
     rows = {row["name"]: row for row in result["parameters"]}
     assert list(rows["theta_offset_2"]) == ["name", "unit", "nominal", "value", "deviation", "informed", "status"]
     assert rows["theta_offset_2"]["nominal"] == pytest.approx(-90)
@@ -80,7 +80,7 @@ def test_calibrate_writes_its_files_and_prints_one_object(truearm: Truearm, smal
 
 
 def test_the_split_is_the_documented_one(small: Path) -> None:
-    run = package.calibrate("irb120", small / "data.csv", train=25, seed=7)
+    run = package.calibrate("irb120", small / "data.csv", train=25, seed=7, model="geometric")
     order = np.random.default_rng(7).permutation(40)
     assert run.training.tolist() == order[:25].tolist()
     assert run.held_out.tolist() == order[25:].tolist()
@@ -88,7 +88,7 @@ def test_the_split_is_the_documented_one(small: Path) -> None:
 
 def test_runs_are_reproducible_byte_for_byte(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     for name in ("a", "b"):
-        truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path / name)
+        truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path / name, "--model=geometric")
     for file in ("calibrated.yaml", "result.json", "calibrated.urdf", "report.html"):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
@@ -98,7 +98,7 @@ def test_validate_works_on_new_data_in_the_same_frames(truearm: Truearm, small: 
     first, second = tmp_path / "first.csv", tmp_path / "second.csv"
     first.write_text(csv_text(data.of_configurations(np.arange(30))))
     second.write_text(csv_text(data.of_configurations(np.arange(30, 40))))
-    truearm("calibrate", "irb120", first, "--train", "all", "--out", tmp_path / "out")
+    truearm("calibrate", "irb120", first, "--train", "all", "--out", tmp_path / "out", "--model=geometric")
     summary = json.loads(truearm("validate", tmp_path / "out" / "calibrated.yaml", second, "--json").out)
     assert summary["configurations"] == 10
     assert summary["position_mm"]["mean"] < 0.2
@@ -108,17 +108,25 @@ def test_validate_works_on_new_data_in_the_same_frames(truearm: Truearm, small: 
 def test_targets_may_have_any_name(truearm: Truearm, small: Path, tmp_path: Path) -> None:
     data = replace(read_csv(small / "data.csv"), targets=("smr 1", "<b>", "Träger, #3: ?"))
     (tmp_path / "data.csv").write_text(csv_text(data), encoding="utf-8")
-    assert truearm("calibrate", "irb120", tmp_path / "data.csv", "--out", tmp_path / "out").code == 0
+    assert (
+        truearm("calibrate", "irb120", tmp_path / "data.csv", "--out", tmp_path / "out", "--model=geometric").code == 0
+    )
     calibrated = tmp_path / "out" / "calibrated.yaml"
     assert json.loads(truearm("show", calibrated, "--json").out)["targets"] == list(data.targets)
     assert truearm("validate", calibrated, tmp_path / "data.csv").code == 0
 
 
 def test_a_calibrated_robot_is_a_robot_like_any_other(truearm: Truearm, small: Path, tmp_path: Path) -> None:
-    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path)
+    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path, "--model=geometric")
     again = json.loads(
         truearm(
-            "calibrate", tmp_path / "calibrated.yaml", small / "data.csv", "--out", tmp_path / "again", "--json"
+            "calibrate",
+            tmp_path / "calibrated.yaml",
+            small / "data.csv",
+            "--out",
+            tmp_path / "again",
+            "--json",
+            "--model=geometric",
         ).out
     )
     assert again["nominal"]["position_mm"]["mean"] == pytest.approx(again["validation"]["position_mm"]["mean"], rel=0.1)
@@ -165,7 +173,7 @@ def test_simulate_is_seeded_and_declares_its_noise(truearm: Truearm, tmp_path: P
 
 
 def test_simulating_a_calibrated_robot_keeps_its_frames(truearm: Truearm, small: Path, tmp_path: Path) -> None:
-    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path)
+    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path, "--model=geometric")
     truth = tmp_path / "calibrated.yaml"
     truearm("simulate", "irb120", "--truth", truth, "--poses", 30, "--noise", 0.05, "--out", tmp_path / "sim.csv")
     summary = json.loads(truearm("validate", truth, tmp_path / "sim.csv", "--json").out)
@@ -202,11 +210,21 @@ def test_too_alike_data_end_with_exit_code_3_and_so_does_a_demo_of_them(
 ) -> None:
     data = read_csv(small / "data.csv").of_configurations([0, 1])
     (tmp_path / "two.csv").write_text(csv_text(data))
-    run = truearm("calibrate", "irb120", tmp_path / "two.csv", "--train", "1", "--out", tmp_path / "out", "--json")
+    run = truearm(
+        "calibrate",
+        "irb120",
+        tmp_path / "two.csv",
+        "--train",
+        "1",
+        "--out",
+        tmp_path / "out",
+        "--json",
+        "--model=geometric",
+    )
     summary = json.loads(run.out)
     assert (run.code, summary["status"]) == (3, "rank-loss")
     assert "rank-loss" in {w["code"] for w in summary["warnings"]}
-    found = package.calibrate("irb120", data, train=1)
+    found = package.calibrate("irb120", data, train=1, model="geometric")
     monkeypatch.setattr("truearm.starting.demo.demonstrated", lambda asked: Demonstration(Path(asked.out), found, None))
     assert truearm("demo", "--out", tmp_path / "demo").code == 3
 
@@ -228,7 +246,7 @@ def test_the_demo_script_stays_where_it_is_called(tmp_path: Path) -> None:
 
 
 def test_the_wrong_robot_is_doubted(truearm: Truearm, small: Path, tmp_path: Path) -> None:
-    run = truearm("calibrate", "irb1600", small / "data.csv", "--out", tmp_path, "--json")
+    run = truearm("calibrate", "irb1600", small / "data.csv", "--out", tmp_path, "--json", "--model=geometric")
     codes = {w["code"]: w["message"] for w in json.loads(run.out)["warnings"]}
     assert run.code == 3
     assert "The readings are not of irb1600" in codes["wrong-robot"]
@@ -251,7 +269,15 @@ def test_a_model_that_cannot_tilt_parallel_axes_says_what_would(truearm: Truearm
         ("standard-dh", "Write 'convention: hayati' in the robot file and 'beta: 0' at the link between them."),
     ):
         truearm("convert", "irb120", "--convention", name, "--out", tmp_path / f"{name}.yaml")
-        run = truearm("calibrate", tmp_path / f"{name}.yaml", small / "data.csv", "--out", tmp_path / "out", "--json")
+        run = truearm(
+            "calibrate",
+            tmp_path / f"{name}.yaml",
+            small / "data.csv",
+            "--out",
+            tmp_path / "out",
+            "--json",
+            "--model=geometric",
+        )
         warnings = {w["code"]: w["message"] for w in json.loads(run.out)["warnings"]}
         assert "Joints 2 and 3 are parallel" in warnings["parallel-axes"]
         assert cure in warnings["parallel-axes"]

@@ -210,7 +210,7 @@ def positioner(measured_data: Path, tmp_path_factory: pytest.TempPathFactory) ->
 
 def test_poses_of_the_positioner_on_all_data(positioner: tuple[Robot, Path]) -> None:
     robot, data = positioner
-    run = calibrate(robot, data, train="all")
+    run = calibrate(robot, data, train="all", model="geometric")
     assert run.train.position_norms.mean() <= 0.39e-3
     assert run.train.orientation_norms.mean() <= 0.81e-3
     assert run.nominal.position_norms.mean() == pytest.approx(0.42e-3, abs=0.01e-3)

@@ -33,7 +33,7 @@ def told(truearm: Truearm, small: Path, tmp_path: Path) -> Callable[..., str]:
 
     def call(data: Path | list[str], *words: object, robot: object = "irb120") -> str:
         file = data if isinstance(data, Path) else written(tmp_path / "data.csv", data)
-        message = refused(truearm, "calibrate", robot, file, *words, "--out", tmp_path / "out")
+        message = refused(truearm, "calibrate", robot, file, *words, "--out", tmp_path / "out", "--model=geometric")
         assert not (tmp_path / "out").exists()
         return message
 
@@ -115,13 +115,15 @@ def test_targets_that_nobody_knows(truearm: Truearm, small: Path, table: list[st
     message = refused(truearm, "validate", "irb120", small / "data.csv")
     assert "the robot has no targets" in message
     assert "calibrated.yaml" in message
-    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path)
+    truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path, "--model=geometric")
     data = written(tmp_path / "new.csv", with_cell(table, 4, "target", "9"))
     message = refused(truearm, "validate", tmp_path / "calibrated.yaml", data)
     assert "new.csv: the robot has no target of this name; got '9'; allowed: 1, 2, 3" in message
     data = written(tmp_path / "data.csv", with_cell(table, 2, "target", "nine"))
     for seed in range(20):  # until it is in the held-out part
-        run = truearm("calibrate", "irb120", data, "--train", "20", "--seed", seed, "--out", tmp_path / "out")
+        run = truearm(
+            "calibrate", "irb120", data, "--train", "20", "--seed", seed, "--out", tmp_path / "out", "--model=geometric"
+        )
         if run.code == 2:
             break
     assert "got 'nine'" in run.err
@@ -161,7 +163,7 @@ def test_an_earlier_result_survives_a_failed_run(
     truearm: Truearm, small: Path, table: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
-    truearm("calibrate", "irb120", small / "data.csv", "--out", out)
+    truearm("calibrate", "irb120", small / "data.csv", "--out", out, "--model=geometric")
     before = {p.name: p.read_bytes() for p in out.iterdir()}
     data = written(tmp_path / "data.csv", with_cell(table, 9, "x [mm]", "?"))
     refused(truearm, "calibrate", "irb120", data, "--out", out)

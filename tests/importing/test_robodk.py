@@ -110,7 +110,7 @@ def test_semicolons_and_decimal_commas(tmp_path: Path) -> None:
 
 def calibrated() -> tuple[truearm.Robot, Dataset]:
     _, data = campaign("irb120", 12, 0.0, 1)
-    return truearm.calibrate("irb120", data, train="all").fit.robot, data
+    return truearm.calibrate("irb120", data, train="all", model="geometric").fit.robot, data
 
 
 def test_out_and_in_again(tmp_path: Path) -> None:
@@ -145,7 +145,7 @@ def test_poses_out_and_in_again(tmp_path: Path) -> None:
 
 def test_joints_as_the_controller_shows_them(tmp_path: Path) -> None:
     _, data = campaign("lrmate200ic", 12, 0.0, 1)
-    robot = truearm.calibrate("lrmate200ic", data, train="all").fit.robot
+    robot = truearm.calibrate("lrmate200ic", data, train="all", model="geometric").fit.robot
     shown = truearm.export_robodk(robot, data)
     model = truearm.export_robodk(robot, data, joints="model")
     assert (shown.joints_are, model.joints_are) == ("controller", "model")

@@ -100,7 +100,7 @@ def test_a_plan_that_is_measured_calibrates_the_robot_as_well_as_its_instrument(
     assert data.sigma is not None
     assert set(data.sigma[data.has_reading].tolist()) == {VIRTUAL["tracker"].sigma}
     assert data.references is not None
-    calibration = truearm.calibrate("irb120", tmp_path / DATA, train=18)
+    calibration = truearm.calibrate("irb120", tmp_path / DATA, train=18, model="geometric")
     assert calibration.validation is not None
     assert calibration.validation.position is not None
     assert calibration.validation.position.mean < 1e-4

@@ -79,7 +79,7 @@ def test_a_choice_among_measured_configurations_keeps_their_names(
 
 
 def test_auto_and_a_calibrated_robot(truearm: Truearm, small: Path, tmp_path: Path) -> None:
-    assert truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path / "done").code == 0
+    assert truearm("calibrate", "irb120", small / "data.csv", "--out", tmp_path / "done", "--model=geometric").code == 0
     rules = tmp_path / "rules.yaml"
     rules.write_text(RULES.replace("floor: 50", "visibility: {within: 90, targets: {'1': [0, 0, 1]}}"))
     calibrated = tmp_path / "done" / "calibrated.yaml"

@@ -117,7 +117,9 @@ RAPID = Path(__file__).parents[1] / "engine" / "programs" / "samples" / "rapid" 
 def test_a_plan_for_a_program_for_poses_and_for_a_region(tmp_path: Path, nominal: bool) -> None:
     robot: object = "irb120"
     if not nominal:
-        robot = truearm.calibrate("irb120", campaign("irb120", 20, 0.05e-3, 1)[1], train="all").fit.robot
+        robot = truearm.calibrate(
+            "irb120", campaign("irb120", 20, 0.05e-3, 1)[1], train="all", model="geometric"
+        ).fit.robot
     file = tmp_path / "poses.csv"
     file.write_text(POSES)
     plan = partial(truearm.plan, robot, poses=12, candidates=60)  # type: ignore[arg-type]

@@ -42,7 +42,7 @@ def test_a_set_is_written_as_other_commands_read_it(truearm: Truearm, tmp_path: 
     assert read_csv(measured).labels == data.labels
     plan = truearm("plan", "irb120", "--from", out, "--poses", 5, "--model", "offsets", "--out", tmp_path / "plan.csv")
     assert plan.code == 0, plan.err
-    template = truearm("calibrate", "irb120", out, "--out", tmp_path / "no")
+    template = truearm("calibrate", "irb120", out, "--out", tmp_path / "no", "--model=geometric")
     assert template.code == 2
     assert "no reading" in template.err or "reading" in template.err
 

@@ -102,7 +102,7 @@ def test_a_plate_gets_better_when_the_controllers_own_kinematics_are_told(
         arm_of_controller = truearm.import_ur_kinematics(cell / "calibration.conf", "ur10").robot
         truearm.export(arm_of_controller, "ur-kinematics", out=tmp_path / "ros.yaml")
         kinematics = tmp_path / "ros.yaml"
-    calibration = truearm.calibrate(robot, cell / "data.csv", seed=3)
+    calibration = truearm.calibrate(robot, cell / "data.csv", seed=3, model="geometric")
     calibrated: truearm.Robot | Path = calibration.robot
     if way == "robot file":
         file = tmp_path / "calibrated.yaml"
@@ -128,7 +128,7 @@ def test_a_plate_gets_worse_when_the_data_sheet_is_taken_for_the_controllers_kin
     cell: Path, arm: ur.Arm
 ) -> None:
     # What happened before anything was asked: the controller corrects what the program corrects again.
-    calibrated = truearm.calibrate("ur10", cell / "data.csv", seed=3).robot
+    calibrated = truearm.calibrate("ur10", cell / "data.csv", seed=3, model="geometric").robot
     with pytest.raises(truearm.InputError, match="controller_kinematics"):
         compensate(calibrated, [cell / "plate.script"], controller_kinematics=None)
     original = (cell / "plate.script").read_text()

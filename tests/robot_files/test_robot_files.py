@@ -80,7 +80,7 @@ def test_a_session_can_be_followed(tmp_path: Path) -> None:
     assert [path.name for path in session.files] == ["my_robot.yaml", "measurements.csv", "check.csv", "session.sh"]
     assert repr(session).splitlines()[1:] == [str(path) for path in session.files]
     robot, data, check, _ = session.files
-    calibration = truearm.calibrate(robot, data)
+    calibration = truearm.calibrate(robot, data, model="geometric")
     assert calibration.validation is not None
     again = truearm.validate(calibration.robot, check)
     assert again.position is not None

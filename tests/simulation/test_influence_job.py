@@ -104,7 +104,7 @@ def test_identification_by_influence_stands_beside_the_standard_one() -> None:
     truth = math.degrees(KATANA.truths["standard"].values["theta_offset_3"])
     assert rows["theta_offset_3"]["calibrate"] == pytest.approx(truth, abs=0.02)
     assert rows["theta_offset_3"]["deviation"] > 0.0
-    calibrated = truearm.calibrate(KATANA, measured())
+    calibrated = truearm.calibrate(KATANA, measured(), model="geometric")
     assert calibrated.validation is not None
     assert calibrated.validation.position is not None
     assert errors["calibrate"] == pytest.approx(calibrated.validation.position.mean, rel=1e-6)

@@ -61,4 +61,4 @@ def test_the_report_names_the_command_without_replacing(window: Window) -> None:
     act(page._replace, True)
     act(page._run)
     report = (window.project.folder / "result" / "result.json").read_text()
-    assert "truearm calibrate irb120 six.csv --out DIR" in report
+    assert "truearm calibrate irb120 six.csv --model geometric --out DIR" in report

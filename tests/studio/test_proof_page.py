@@ -136,6 +136,12 @@ def test_a_result_whose_history_is_written_otherwise_is_shown_with_what_it_says(
     assert "Of irb120, model offsets, payload none, no reading excluded." in proof._table.content
     window.edit(model="geometric", seed=3)
     assert "made with model offsets. Chosen now: model geometric." in proof._now.content
+    window.edit(model=None)
+    assert "made with model offsets. Chosen now: model by default." in proof._now.content
+    content = file.read_text().replace('"name": "offsets",', '"name": "offsets", "because": "loads are known",')
+    file.write_text(content)
+    window._reload()
+    assert "Chosen now: model" not in proof_of(window)._now.content
 
 
 def test_an_edited_robot_of_the_same_name_is_another_robot(window: Window) -> None:

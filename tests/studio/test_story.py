@@ -171,16 +171,14 @@ def the_whole_work(person: Person, truearm: Truearm, monkeypatch: pytest.MonkeyP
     person.press("Check the measurements")
     person.wait_for("Check: done")
     monkeypatch.chdir(folder)
-    for line in (
-        truearm("check", "irb120", "measurements.csv").out.replace("--model elastic", "model=elastic").splitlines()
-    ):
+    for line in truearm("check", "irb120", "measurements.csv").out.replace("--model ", "model=").splitlines():
         assert " ".join(line.split()) in person.shown()
     person.picture("check")
 
     person.turn_to("Calibrate")
     person.press("Calibrate")
     person.page.get_by_role("button", name="Cancel").wait_for()
-    words = ["calibrate", "irb120", "measurements.csv", "--model", "elastic", "--payload", "2.7kg,50mm,25mm,100mm"]
+    words = ["calibrate", "irb120", "measurements.csv", "--payload", "2.7kg,50mm,25mm,100mm"]
     printed = truearm(*words, "--out", tmp_path / "by-command").out  # at the same time
     person.wait_for("Written to result: ")
     said = person.shown()

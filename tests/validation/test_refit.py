@@ -36,7 +36,7 @@ SHIFT = np.array([1.2, -3.4, 0.2])
 def cell(seed: int = 5, robot: str = "irb120") -> tuple[Twin, Robot, Dataset]:
     """Return a twin, its calibrated robot, and new readings of it."""
     twin, data = campaign(robot, 40, NOISE, seed)
-    return twin, calibrate(robot, data).robot, more_of(twin, 15, NOISE, 100 + seed)
+    return twin, calibrate(robot, data, model="geometric").robot, more_of(twin, 15, NOISE, 100 + seed)
 
 
 def points_of(twin: Twin) -> dict[str, Array]:

@@ -28,7 +28,7 @@ from truearm.validation.validate import measure_farther
 
 @pytest.fixture(scope="module")
 def run() -> Calibration:
-    return calibrate("irb120", campaign("irb120", 40, 0.02e-3, 1)[1], train=30)
+    return calibrate("irb120", campaign("irb120", 40, 0.02e-3, 1)[1], train=30, model="geometric")
 
 
 def distances(robot: Robot, data: Dataset) -> RegionDistances:

@@ -25,7 +25,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Dataset]
     folder = tmp_path_factory.mktemp("validated")
     twin, data = campaign("irb120", 30, 0.05e-3, 1)
     (folder / "first.csv").write_text(csv_text(data))
-    calibrate("irb120", folder / "first.csv", out=folder / "result", train=20)
+    calibrate("irb120", folder / "first.csv", out=folder / "result", train=20, model="geometric")
     return folder, more_of(twin, 12, 0.05e-3, 2)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.command.groups import Excluding, IntoFolder, Loaded, Long, Noted, OfCell, OfData, Repeatable, Split
@@ -13,9 +13,15 @@ from truearm.engine.command.request import as_in, job, option
 
 if TYPE_CHECKING:
     from truearm.calibration.result import Calibration
+    from truearm.engine.data.dataset import Dataset
     from truearm.engine.fit.bounds import Bounds
     from truearm.engine.fit.losses import Loss
     from truearm.engine.fit.rounds import Redundant
+    from truearm.engine.robot.robot import Robot
+
+#: Training configurations from which on `auto` predicts as well as `geometric` where nothing is known of loads. On
+#: twins whose joints have play and on twins that have none, its median error is then at most 3 % larger.
+ENOUGH: Final = 15
 
 
 def _models() -> Collection[str]:
@@ -42,12 +48,14 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
         "For anything that cannot be used, with a message that says what to do. Where a sound result stays, it is a "
         ":class:`truearm.calibration.parts.ResultKeptError`, which has the new one as its attribute ``result``."
     )
-    model: str = option(
+    model: str | None = option(
         Choice("MODEL", _models),
-        "offsets, joints, geometric, elastic, tilting, full; auto: every joint effect, as large as the data tell; "
+        "auto: every joint effect, as large as the data tell; offsets, joints, geometric, elastic, tilting, full; "
         "frames: base, tool and fixtures alone.",
-        default="geometric",
-        more="``auto`` chooses nothing: what the training part does not support shrinks to nothing.",
+        default=None,
+        shown=f"auto where loads are known or {ENOUGH} configurations are trained on, else geometric",
+        more="It is ``geometric`` too with `effects`, `zones`, `monte_carlo`, and a `redundancy` other than ``prior``. "
+        "``auto`` chooses nothing: what the training part does not support shrinks to nothing.",
     )
     loss: Loss = option(
         Choice("LOSS", ("linear", "huber", "cauchy", "l1", "l1-components")),
@@ -167,6 +175,33 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
                 parameter="monte_carlo, bootstrap",
                 cure="Leave one of them out.",
             )
+
+    def model_for(self, robot: Robot, training: Dataset) -> tuple[str, str]:
+        """Return the name of the model, and why it is this one; the latter is empty if it was named.
+
+        Args:
+            robot: The nominal one, with its loads.
+            training: The training part.
+        """
+        from truearm.engine.fit.every_effect import AUTO, loads_bend
+
+        if self.model is not None:
+            return self.model, ""
+        because = {
+            "effects are added to it": bool(self.effects),
+            "zones are asked for": self.zones is not None,
+            "calibrations are simulated": self.monte_carlo is not None,
+            f"redundancy is {self.redundancy}": self.redundancy != "prior",
+        }
+        for reason, is_so in because.items():
+            if is_so:
+                return "geometric", reason
+        if loads_bend(robot, training):
+            return AUTO, "loads are known"
+        count = training.configurations
+        if count >= ENOUGH:
+            return AUTO, f"{count} configurations are enough"
+        return "geometric", f"loads are not known, and {count} configurations are few"
 
     def run(self) -> Calibration:
         """Calibrate."""

@@ -78,7 +78,7 @@ from truearm.engine.robot.robot_file.seal import is_intact
 if TYPE_CHECKING:
     from truearm.calibration.calibrate import Calibrate
 
-#: What is identified along with a base that moved, and simulated, where the model is chosen.
+#: What is identified along with a base that moved, and simulated, where every effect is in the model.
 GEOMETRIC: Final = named_model("geometric")
 #: That much time may go into the errors that are told of a fit [s], and that share of the fit's own.
 _TIME: Final = 0.5
@@ -178,7 +178,7 @@ def simulate_calibrations(
 
 #: The step at which everything that was given has been read and found usable.
 ACCEPTED: Final = "checking the data"
-#: Every model that can be asked for by name; None chooses.
+#: Every model that can be asked for by name; None for every effect.
 MODELS: Final[dict[str, Model | None]] = {m.name: m for m in (FRAMES, *EVERY_MODEL)} | {AUTO: None}
 
 
@@ -195,7 +195,6 @@ class _FitOptions(TypedDict):
 class _Read:
     robot: Robot  #: The nominal one, with its loads.
     urdf: bytes | None  #: The user's own, if that is where the robot came from.
-    model: Model | None  #: None chooses.
     as_read: Dataset  #: All readings.
     readings: Dataset  #: Those that count.
     sha256: str | None  #: Of their file.
@@ -212,6 +211,8 @@ class _Parts:
     readings: Dataset
     training: NDArray[np.intp]  #: training, held_out: indices of configurations.
     held_out: NDArray[np.intp]
+    model: Model | None  #: None for every effect.
+    because: str  #: Why it is this one; empty if it was named.
     first: Dataset  #: What is trained on.
     second: Dataset | None  #: What judges; None if nothing is held out.
     excluded: tuple[Excluded, ...]  #: With the part that each belongs to.
@@ -260,12 +261,9 @@ def _read(asked: Calibrate, zones: WantedZones | None) -> _Read:
     asked.progress("reading the robot")
     source = urdf_source(asked.robot) if isinstance(asked.robot, str | Path) else None
     urdf = None if source is None else read_bytes(source[0])
-    robot, model = asked.loads.on(robot_argument(asked.robot)), MODELS[asked.model]
-    if model is not None and asked.effects:
-        with refusals_of("effects"):
-            refuse_balancers_that_are_not_there(robot, asked.effects)
-            model = model.also(asked.effects)
-            model.free(model.prepared(robot))
+    robot = asked.loads.on(robot_argument(asked.robot))
+    with refusals_of("effects"):
+        refuse_balancers_that_are_not_there(robot, asked.effects)
     asked.progress("reading the data")
     as_read = readings_argument(robot, asked.data)
     sha256 = None
@@ -280,7 +278,18 @@ def _read(asked: Calibrate, zones: WantedZones | None) -> _Read:
         with refusals_of("bounds"):
             bounds = read_bounds(path_argument(bounds, "bounds"))
     options = _FitOptions(loss=asked.loss, redundancy=asked.redundancy, bounds=bounds, bounds_file=bounds_file)
-    return _Read(robot, urdf, model, as_read, readings, sha256, tuple(excluded), fixed, options, zones)
+    return _Read(robot, urdf, as_read, readings, sha256, tuple(excluded), fixed, options, zones)
+
+
+def _model(asked: Calibrate, robot: Robot, training: Dataset) -> tuple[Model | None, str]:
+    """Return the model with the effects that are added, and why it is this one."""
+    name, because = asked.model_for(robot, training)
+    model = MODELS[name]
+    if model is not None and asked.effects:
+        with refusals_of("effects"):
+            model = model.also(asked.effects)
+            model.free(model.prepared(robot))
+    return model, because
 
 
 def _split(asked: Calibrate, read: _Read) -> _Parts:
@@ -289,6 +298,7 @@ def _split(asked: Calibrate, read: _Read) -> _Parts:
     count = train_count(asked.train, readings.configurations, readings.source)
     order = np.random.default_rng(asked.seed).permutation(readings.configurations)
     training, held_out = order[:count], order[count:]
+    model, because = _model(asked, read.robot, readings.of_configurations(training))
     excluded = in_parts(read.excluded, readings, held_out)
     if not readings.has_reading.any():
         raise InputError(
@@ -307,12 +317,14 @@ def _split(asked: Calibrate, read: _Read) -> _Parts:
     if asked.base_changes:
         asked.progress("finding how the base moved")
         steady, moved = with_one_base(
-            read.robot, steady, training, asked.base_changes, read.model or GEOMETRIC, asked.loss, read.fixed
+            read.robot, steady, training, asked.base_changes, model or GEOMETRIC, asked.loss, read.fixed
         )
     noticed = notices_of(readings, read.robot, steady=steady, excluded=count_excluded(excluded))
     first = steady.of_configurations(training)
     second = steady.of_configurations(held_out) if len(held_out) else None
-    return _Parts(steady, training, held_out, first, second, tuple(excluded), tuple(noticed), tuple(moved))
+    return _Parts(
+        steady, training, held_out, model, because, first, second, tuple(excluded), tuple(noticed), tuple(moved)
+    )
 
 
 def _identified(asked: Calibrate, read: _Read, parts: _Parts) -> _Identified:
@@ -321,9 +333,9 @@ def _identified(asked: Calibrate, read: _Read, parts: _Parts) -> _Identified:
     robot, first = read.robot, parts.first
     placed = place(robot, first, asked.loss, read.fixed)
     if asked.monte_carlo is not None:
-        refuse_too_many(placed, first, read.model or GEOMETRIC)
+        refuse_too_many(placed, first, parts.model or GEOMETRIC)
     shares, notices = None, list[Notice]()
-    if read.model is None:
+    if parts.model is None:
         with followed(asked.progress, parts.judges, held_out=parts.second is not None):
             robot, fit, shares = identify_every_effect(
                 robot,
@@ -337,7 +349,7 @@ def _identified(asked: Calibrate, read: _Read, parts: _Parts) -> _Identified:
         model = fit.model
         notices += check_shares(shares)
     else:
-        model, notices = without_unseen_balancers(read.model, first)
+        model, notices = without_unseen_balancers(parts.model, first)
         asked.progress(f"identifying the {model.name} model on {len(parts.training)} configurations")
         with followed(asked.progress, parts.judges, held_out=parts.second is not None):
             fit = identify(
@@ -425,6 +437,7 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
         history=_history(asked, read, parts, solved),
         urdf=read.urdf,
         shares=solved.shares,
+        because=parts.because,
         known_before=_known_before(solved.robot),
         without=tuple(asked.without),
         excluded=parts.excluded,

@@ -225,7 +225,8 @@ def _certified(run: Calibration) -> list[tuple[str, str | Sequence[NextStep]]]:
         facts.append(("What to do", run.advice))
     if run.next:
         facts.append(("Next", run.next))
-    facts.append(("Model", f"{run.fit.model.name}: {run.fit.model.summary}"))
+    because = f" (because {run.because})" if run.because else ""
+    facts.append(("Model", f"{run.fit.model.name}: {run.fit.model.summary}{because}"))
     if robot.payload.mass:
         place = ", ".join(f"{v * 1000:g}" for v in robot.payload.cog)
         facts.append(("Payload", f"{robot.payload.mass:g} kg at ({place}) mm on the flange"))

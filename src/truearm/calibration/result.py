@@ -81,7 +81,8 @@ class Calibration(Record):
     command: str  #: How to run it again.
     history: str  #: What was done, in one line with the hash of the data.
     urdf: bytes | None = None  #: The user's own URDF, if that is where the robot came from.
-    shares: Shares | None = None  #: What every effect does, where all are in the model; None if it was named.
+    shares: Shares | None = None  #: What every effect does, where all are in the model; else None.
+    because: str = ""  #: Why the model is this one; empty if it was named.
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
     known_before: Proof | None = None  #: What was known of the robot from an earlier calibration; None if nothing was.
     without: tuple[str, ...] = ()  #: Labels of the configurations that were left out; `data` does not have them.
@@ -185,6 +186,8 @@ class Calibration(Record):
             )
             yield detail(f"On the {trained}:", after)
         yield say(nominal=errors_summary(self.nominal), train=errors_summary(self.train))
+        if self.because:
+            yield detail(f"Model: {self.fit.model.name}, because {self.because}")
         if self.fit.fixed:
             yield detail(f"Held at known places: {listed(self.fit.fixed.words)}", held=list(self.fit.fixed.words))
         if self.without:
@@ -223,7 +226,11 @@ class Calibration(Record):
             **self.summary(),
             "command": self.command,
             "history": self.history,
-            "model": {"name": self.fit.model.name, "effects": list(self.fit.model.effects)},
+            "model": {
+                "name": self.fit.model.name,
+                "effects": list(self.fit.model.effects),
+                **({"because": self.because} if self.because else {}),
+            },
             "parameters": list(self._parameters()),
             **json_of(self._further()),
         }

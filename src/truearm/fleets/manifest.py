@@ -18,6 +18,7 @@ from truearm.engine.base.files import read_bytes, read_yaml
 from truearm.engine.base.limits import refuse_beyond
 from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.units import sized_si
+from truearm.engine.command.groups import OfModel
 from truearm.engine.data.controller_joints import in_model_joints
 from truearm.engine.data.readers.canonical import read_csv
 from truearm.engine.fit.models import named_model
@@ -126,7 +127,7 @@ class ExperimentFile(BaseModel):
     count: Count
     configurations: Configurations = 20
     targets: Annotated[int, Field(ge=1, le=8, strict=True)] = 1
-    model: str = Calibrate.default("model")
+    model: str = OfModel.default("model")
     noise: NotNegative
     held_out: Count = 50
     seed: Annotated[int, Field(ge=0, strict=True)] = Calibrate.default("seed")

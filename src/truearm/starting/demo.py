@@ -100,9 +100,7 @@ def demonstrated(asked: Demonstrate) -> Demonstration:
                 cure="Choose another `out`.",
             )
     write_files(folder, {path.name: text, _PLATE: plate})
-    calibration = calibrate(
-        "irb120", path, out=folder, model="elastic", payload=twin.robot.payload, progress=asked.progress
-    )
+    calibration = calibrate("irb120", path, out=folder, payload=twin.robot.payload, progress=asked.progress)
     shown = Demonstration(folder, calibration, None)
     if calibration.status is not Status.CONVERGED:
         return shown

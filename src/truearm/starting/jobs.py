@@ -48,7 +48,7 @@ class Demonstrate(Long):
     """Run the main job on a built-in digital twin of an ABB IRB 120: calibrate it and correct a program.
 
     The truth is the robot that Nubiola's thesis identified (Tables 2.6 and 2.7), with its compliance, and with gears
-    that err by 0.01 deg two hundred times in a turn: those are beyond the elastic model, so the report has a remainder.
+    that err by 0.01 deg two hundred times in a turn.
     """
 
     job = "demo"

@@ -27,6 +27,7 @@ class MadeWith:
 
     robot: Robot | None  #: The calibrated one; None if it is not there.
     model: str  #: By its name, with joint effects that were added.
+    by_default: bool  #: Whether no model was named.
     #: Name of the file of measurements; None if the history of the result is written otherwise, and so for the rest.
     data: str | None
     train: int  #: train, configurations: how many it was trained on, of how many.
@@ -53,7 +54,9 @@ class MadeWith:
         Args:
             robot: The one that is chosen, with the payload of the settings.
         """
-        found: dict[str, tuple[object, object]] = {"model": (self.model, settings.model)}
+        found: dict[str, tuple[object, object]] = {}
+        if settings.model is not None or not self.by_default:
+            found["model"] = (self.model, settings.model or "by default")
         if self.data is not None:
             found["training part"] = (self.train, self._trained(settings.train))
             found["seed"] = (self.seed, settings.seed)
@@ -82,11 +85,12 @@ def made_with(result: dict[str, Any], robot: Robot | None) -> MadeWith:
         robot: The calibrated one of the same folder.
     """
     excluded = sum(int(one["readings"]) for one in result.get("excluded", ()))
+    by_default = "because" in result["model"]
     match = _HISTORY.search(str(result.get("history", "")))
     if match is None:
-        return MadeWith(robot, str(result["model"]["name"]), None, 0, 0, 0, "", excluded)
+        return MadeWith(robot, str(result["model"]["name"]), by_default, None, 0, 0, 0, "", excluded)
     model, train, of, data, seed, loss = match.groups()
-    return MadeWith(robot, model, data, int(train), int(of), int(seed), loss, excluded)
+    return MadeWith(robot, model, by_default, data, int(train), int(of), int(seed), loss, excluded)
 
 
 def _payload(robot: Robot) -> str:

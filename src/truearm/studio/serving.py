@@ -26,7 +26,6 @@ DEMONSTRATION: Final[Mapping[str, Any]] = {
     "robot": "irb120",
     "data": "measurements.csv",
     "payload": "2.7kg,50mm,25mm,100mm",
-    "model": "elastic",
     "program": "plate.mod",
     "cell": "cell.yaml",
     "taught": ["none"],

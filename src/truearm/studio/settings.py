@@ -43,7 +43,7 @@ class Settings(BaseModel):
     data: _Name | None = None  #: File of measurements; None for none yet.
     exclude: _Name | None = None  #: File of readings that are excluded; None for none.
     payload: _Name | None = None  #: What the robot carried, as a text such as ``2.7kg,50mm,25mm,100mm``.
-    model: _Name = Calibrate.default("model")  #: model, train, loss, seed: as for :func:`truearm.calibrate`.
+    model: _Name | None = None  #: model, train, loss, seed: as for :func:`truearm.calibrate`.
     train: Annotated[int, Field(strict=True, ge=1)] | Literal["all"] | None = None
     seed: Annotated[int, Field(strict=True, ge=0)] = Calibrate.default("seed")
     loss: _Name = Calibrate.default("loss")

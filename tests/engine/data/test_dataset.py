@@ -309,13 +309,13 @@ def test_copies_that_the_fit_has_seen_prove_nothing() -> None:
     rng, true = np.random.default_rng(4), off_nominal()
     q = true.random_configurations(40, rng)
     data = Dataset.of(q, true.forward(q, frame="world", target="1")[0] + rng.normal(0.0, 1e-5, (40, 3)))
-    drawn = calibrate("irb120", data.of_configurations(rng.integers(0, 40, 40)))
+    drawn = calibrate("irb120", data.of_configurations(rng.integers(0, 40, 40)), model="geometric")
     origins = np.array([label.partition("#")[0] for label in drawn.data.labels])
     (said,) = [w.message for w in drawn.warnings if w.code == "held-out-seen"]
     assert said.startswith("Of 12 held-out configurations ")
     assert {*origins[drawn.training]} & {*origins[drawn.held_out]}
-    assert "held-out-seen" not in [w.code for w in calibrate("irb120", data).warnings]
-    alone = calibrate("irb120", data.of_configurations([*range(40), 0]), train=40, seed=2)
+    assert "held-out-seen" not in [w.code for w in calibrate("irb120", data, model="geometric").warnings]
+    alone = calibrate("irb120", data.of_configurations([*range(40), 0]), train=40, seed=2, model="geometric")
     assert ("held-out-seen" in [w.code for w in alone.warnings]) is bool({0, 40} & {*alone.held_out.tolist()})
 
 

@@ -10,8 +10,7 @@ import pytest
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.curves import check_curves, check_curves_of_loads, share_of_loads
-from truearm.engine.diagnose.next_steps import other_model
-from truearm.engine.diagnose.unmodelled import Explanation, LeftOver
+from truearm.engine.diagnose.unmodelled import LeftOver
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.library import load_robot
@@ -67,10 +66,3 @@ def test_curves_beside_the_periods_they_contain_are_told() -> None:
     data, fit = fitted("gears", "fourier")
     notice = next(notice for notice in check_curves(fit, data) if notice.code == "curves-and-fourier")
     assert notice.level == "note"
-
-
-def test_who_is_advised_to_use_two_periods_is_told_of_curves() -> None:
-    _, fit = fitted("gears")
-    step = other_model(fit, Explanation("fourier", 0.5, 0.0, 0.0), 1e-4)
-    assert step.code == "other-model"
-    assert "`effects=fourier`, or `effects=joint-curve`, which contains it" in step.message

@@ -159,7 +159,7 @@ def test_what_makes_it_a_lower_bound(arm: Fit) -> None:
     bare = calibrate(IRB120, campaign("irb120", 30, 0.02e-3, 1, "nominal")[1], model="frames").expected
     assert (bare.lower_bound, bare.omissions[0]) == (True, "the robot's own geometry counts as exact")
     _, data = campaign("irb120", 30, 0.02e-3, 1)
-    result = calibrate(IRB120, replace(data, position=data.position * 1e3))
+    result = calibrate(IRB120, replace(data, position=data.position * 1e3), model="geometric")
     assert result.status is Status.IMPLAUSIBLE
     assert "what was fitted cannot be this robot" in result.expected.omissions
     assert "narrow-data" not in {n.code for n in result.warnings}
@@ -169,11 +169,13 @@ def test_what_is_left_is_not_said_to_be_the_robots_where_readings_are_doubted() 
     _, data = campaign("irb120", 30, 0.02e-3, 1)
     position = data.position.copy()
     position[[5, 50]] += [[0.02], [0.01]]
-    off = calibrate(IRB120, replace(data, position=position))
+    off = calibrate(IRB120, replace(data, position=position), model="geometric")
     assert "outliers" in {n.code for n in off.warnings}
     (words,) = off.expected.omissions
     assert words.startswith("readings are doubted")
-    (declared,) = calibrate(IRB120, replace(data, sigma=np.full(len(position), 4e-6))).expected.omissions
+    (declared,) = calibrate(
+        IRB120, replace(data, sigma=np.full(len(position), 4e-6)), model="geometric"
+    ).expected.omissions
     assert declared.startswith("the residuals are larger than the declared deviations")
     assert all("the robot does" not in word for word in (words, declared))
 
@@ -240,7 +242,7 @@ def test_a_map_is_dark_where_nothing_was_measured() -> None:
 
 def calibrated(degrees: float | None, train: str | None = None) -> Calibration:
     data = read_narrowly(degrees, 3)[1] if degrees else campaign("irb120", 60, 0.02e-3, 3)[1]
-    return calibrate(IRB120, data, train=train)  # type: ignore[arg-type]
+    return calibrate(IRB120, data, train=train, model="geometric")  # type: ignore[arg-type]
 
 
 def test_narrow_data_are_an_error_that_names_the_joints() -> None:
@@ -260,7 +262,7 @@ def test_narrow_data_are_an_error_that_names_the_joints() -> None:
     twin = truth_twin(IRB120, "random", rng)
     narrow = replace(twin, robot=twin.robot.with_frames(twin.robot.base, {"1": (0.0, 0.0, 0.125)}))
     data = measure(narrow, narrowed(40.0).random_configurations(60, rng), 0.02e-3, rng)
-    result = calibrate(IRB120, data)
+    result = calibrate(IRB120, data, model="geometric")
     (notice,) = (n for n in result.warnings if n.code == "narrow-data")
     assert notice.level == "warning"
     assert result.finished
@@ -276,24 +278,24 @@ def test_data_of_one_orientation_name_a_region() -> None:
     alike = IRB120.inverse(places[near], np.repeat(turned[:1], len(near), axis=0), seed=q[near]).joints
     alike = alike[np.isfinite(alike).all(axis=1)][:60]
     assert (np.ptp(alike, axis=0) > 0.5 * np.minimum(2 * np.pi, [np.ptp(j.range) for j in IRB120.joints])).all()
-    result = calibrate(IRB120, measure(twin, alike, 0.02e-3, rng))
+    result = calibrate(IRB120, measure(twin, alike, 0.02e-3, rng), model="geometric")
     (notice,) = (n for n in result.warnings if n.code == "narrow-data")
     assert "also with targets about" in notice.message
 
 
 def test_data_of_the_whole_workspace_and_without_noise_are_not_called_narrow() -> None:
     for seed in range(2):
-        result = calibrate(IRB120, campaign("irb120", 60, 0.02e-3, seed)[1])
+        result = calibrate(IRB120, campaign("irb120", 60, 0.02e-3, seed)[1], model="geometric")
         assert "narrow-data" not in {n.code for n in result.warnings}
         assert result.expected.overall.mean < known(known(result.validation).position).mean
-    result = calibrate(IRB120, campaign("irb120", 40, 0.0, 1)[1])
+    result = calibrate(IRB120, campaign("irb120", 40, 0.0, 1)[1], model="geometric")
     assert "narrow-data" not in {n.code for n in result.warnings}
 
 
 def test_a_closed_loop_is_expected_up_to_its_gauge_freedoms() -> None:
     rng = np.random.default_rng(0)
     twin = truth_twin(IRB120, "random", rng)
-    result = calibrate(IRB120, measured_with(named_device("gauges"), IRB120, twin, 60, rng))
+    result = calibrate(IRB120, measured_with(named_device("gauges"), IRB120, twin, 60, rng), model="geometric")
     assert result.expected.frame.startswith("the robot's base frame, up to its pose")
     (notice,) = (n for n in result.warnings if n.code == "closed-loop")
     assert f"accurate to about {result.expected.overall.mean * 1e3:.2g} mm" in notice.message

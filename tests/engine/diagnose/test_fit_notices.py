@@ -86,21 +86,21 @@ def test_pairs_tell_gain_loss_and_neither() -> None:
 def test_a_robot_that_is_accurate_already_is_no_error() -> None:
     for seed in (5, 3):
         accurate = campaign("irb120", 40, 2e-5, seed, "nominal")[1]
-        result = truearm.calibrate("irb120", accurate)
+        result = truearm.calibrate("irb120", accurate, model="geometric")
         assert [(n.code, n.level) for n in result.warnings] == [("no-gain", "warning")], seed
         assert (result.finished, result.faults) == (True, ("no-gain",)), seed
-        assert truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, seed)[1]).faults == (), seed
+        assert truearm.calibrate("irb120", campaign("irb120", 40, 2e-5, seed)[1], model="geometric").faults == (), seed
     # without a held-out part or another robot nothing is compared
-    codes = {notice.code for notice in truearm.calibrate("irb120", accurate, train="all").warnings}
+    codes = {notice.code for notice in truearm.calibrate("irb120", accurate, train="all", model="geometric").warnings}
     assert codes == {"nothing-held-out"}
     assert truearm.calibrate("irb120", accurate, model="frames").warnings == ()
     # one that was calibrated before is accurate already
     twin_data = campaign("irb120", 80, 2e-5, 3)[1]
     first, second = twin_data.of_configurations(np.arange(40)), twin_data.of_configurations(np.arange(40, 80))
-    before = truearm.calibrate("irb120", first)
+    before = truearm.calibrate("irb120", first, model="geometric")
     assert before.faults == ()
-    assert truearm.calibrate(before.robot, second).faults == ("no-gain",)
-    assert truearm.calibrate("irb120", second).faults == ()
+    assert truearm.calibrate(before.robot, second, model="geometric").faults == ("no-gain",)
+    assert truearm.calibrate("irb120", second, model="geometric").faults == ()
 
 
 # -- declared deviations, and what is far from nominal -------------------------------------------------------------
@@ -116,7 +116,7 @@ def judged(robot: str, data: Dataset) -> list[Notice]:
 
 def test_sigma_that_is_too_large_is_a_warning_and_an_error_where_it_holds_the_robot_at_its_priors() -> None:
     for poses in (12, 40):
-        run = calibrate("irb120", declaring(campaign("irb120", poses, 0.02e-3, 0)[1], 1000.0))
+        run = calibrate("irb120", declaring(campaign("irb120", poses, 0.02e-3, 0)[1], 1000.0), model="geometric")
         assert not run.finished
         (notice,) = [n for n in run.warnings if n.code == "sigma-too-large"]
         assert notice.level == "error"
@@ -158,7 +158,9 @@ def test_a_joint_that_was_mastered_badly_is_noted() -> None:
     assert notice.message.startswith("theta_offset_3 moved by more than 6 standard deviations of its prior.")
     assert "nominal values are those of its controller" in notice.message
     # and nothing where the robot is another one
-    codes = {notice.code for notice in calibrate("irb120", campaign("irb1600", 30, 5e-5, 5)[1]).warnings}
+    codes = {
+        notice.code for notice in calibrate("irb120", campaign("irb1600", 30, 5e-5, 5)[1], model="geometric").warnings
+    }
     assert "wrong-robot" in codes
     assert "far-from-nominal" not in codes
 
@@ -184,7 +186,7 @@ def fitted(data: Dataset, loss: Loss = "linear") -> Fit:
 def test_a_fit_that_leaves_nothing_is_not_taken_for_one_without_noise(seed: int) -> None:
     """33 numbers for 41 parameters: the expected error was a ten thousandth of the true one, and the advice to stop."""
     twin = campaign("ur5e", 16, FINE, seed)[0]
-    result = calibrate("ur5e", in_turn(16, seed, declared=False), seed=seed)
+    result = calibrate("ur5e", in_turn(16, seed, declared=False), seed=seed, model="geometric")
     q = load_robot("ur5e").random_configurations(100, np.random.default_rng(1))
     apart = [result.robot.world_poses(q, name)[0] - twin.robot.world_poses(q, name)[0] for name in ("1", "2", "3")]
     true = float(np.linalg.norm(apart, axis=2).mean())
@@ -262,7 +264,7 @@ def test_errors_that_the_fit_has_eaten_do_not_make_data_narrow() -> None:
     whole = replace(campaign("irb120", 13, FINE, 3)[1], sigma=None)
     masked = replace(whole, position=np.where((whole.target == 0)[:, None], whole.position, np.nan))
     for poses, few in ((11, True), (13, False)):
-        result = calibrate("irb120", masked.of_configurations(np.arange(poses)), train="all")
+        result = calibrate("irb120", masked.of_configurations(np.arange(poses)), train="all", model="geometric")
         codes = [notice.code for notice in result.warnings]
         assert (FEW_READINGS.code in codes) is few
         assert "narrow-data" not in codes
@@ -410,5 +412,9 @@ def test_what_cannot_be_a_change_of_the_base_is_refused_and_what_is_none_moves_n
         refused(None, words, calibrate, "irb120", data, base_changes=labels)
     orderless = replace(data, number=None, approach=None)
     refused(None, "the order of measurement is not known", calibrate, "irb120", orderless, base_changes=["24"])
-    (notice,) = [n for n in calibrate("irb120", data, base_changes=["24"]).warnings if n.code == "base-changed"]
+    (notice,) = [
+        n
+        for n in calibrate("irb120", data, base_changes=["24"], model="geometric").warnings
+        if n.code == "base-changed"
+    ]
     assert float(re.findall(r"by ([0-9.]+) mm", notice.message)[0]) < 0.06

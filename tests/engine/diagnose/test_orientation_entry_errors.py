@@ -160,7 +160,7 @@ def test_a_single_orientation_that_is_off_is_doubted_and_not_its_position() -> N
         "1 orientation is far off, and the positions are not (configuration/target): 5/1 (2.99 deg)"
     )
     assert [step.code for step in result.next] == ["see-warning", "calibrate"]
-    run = calibrate(ROBOT, data, train=15)
+    run = calibrate(ROBOT, data, train=15, model="geometric")
     codes = {notice.code for notice in run.warnings}
     assert "orientation-outliers" in codes
     assert not codes & {"narrow-data", "residuals-exceed-sigma"}

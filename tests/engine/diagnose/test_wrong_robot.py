@@ -85,7 +85,7 @@ def test_a_measured_ur5_is_not_doubted(measured_data: Path, tmp_path: Path) -> N
     lengths = Lengths.of(identify(robot, data, GEOMETRIC), data)
     assert len(lengths.moved) >= 4
     assert lengths.chi_squared < 2.0
-    assert "wrong-robot" not in {notice.code for notice in calibrate(robot, data).warnings}
+    assert "wrong-robot" not in {notice.code for notice in calibrate(robot, data, model="geometric").warnings}
 
 
 def test_what_is_known_by_its_sum_is_judged_by_its_sum() -> None:
@@ -172,7 +172,7 @@ def test_a_entry_error_is_not_another_robot() -> None:
 def test_wrong_data_are_said_before_the_robot_is_doubted() -> None:
     data = campaign_of(UR10, 60, 4)[1]
     moved = replace(data, position=data.position + np.where(data.configuration >= 30, 0.03, 0.0)[:, None])
-    errors = {notice.code for notice in calibrate(UR10, moved).warnings if notice.level == "error"}
+    errors = {notice.code for notice in calibrate(UR10, moved, model="geometric").warnings if notice.level == "error"}
     assert "instrument-moved" in errors
     assert "wrong-robot" not in errors
 

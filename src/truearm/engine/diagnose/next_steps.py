@@ -42,8 +42,6 @@ from truearm.engine.diagnose.unmodelled import (
 )
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.effects.fourier import Fourier
-from truearm.engine.robot.effects.joint_curve import JointCurve
 
 #: Configurations named one by one.
 _NAMED: Final = 3
@@ -124,28 +122,13 @@ def other_model(fit: Fit, candidate: Explanation, known: float) -> NextStep:
     if candidate.cause == LOADS:
         words = (
             f"Joints that give way explain {share} of what is left, but the robot has no masses: give masses in the "
-            "robot file or what it carried (`payload`), and use `model=elastic`."
+            "robot file or what it carried (`payload`)."
         )
         return NextStep("give-loads", words, gain)
     if candidate.cause == GEOMETRY:
         words = f"Use `model=geometric`: free geometry and joint zeros explain {share} of what is left."
         return NextStep("other-model", words, gain)
-    plain = "geometry" in fit.model.groups and not fit.model.effects
-    if candidate.cause == "compliance" and plain:
-        return NextStep(
-            "other-model", f"Use `model=elastic`: joints that give way explain {share} of what is left.", gain
-        )
-    if candidate.cause == Fourier.name:
-        words = (
-            f"Add `effects={candidate.cause}`, or `effects={JointCurve.name}`, which contains it and is found from "
-            f"some 100 configurations on, or use `model=auto`, which has every effect: it explains {share} of what "
-            "is left."
-        )
-        return NextStep("other-model", words, gain)
-    words = (
-        f"Add `effects={candidate.cause}`, or use `model=auto`, which has every effect: it explains {share} of what is "
-        "left."
-    )
+    words = f"Use `model=auto`, which has every joint effect: {candidate.cause} explains {share} of what is left."
     return NextStep("other-model", words, gain)
 
 
@@ -258,8 +241,8 @@ def steps_after_check(
         steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
     elif not any(step.code in ("other-model", "give-loads") for step in steps):
         explainable = left is not None and can_explain(left)
-        also = ": no joint effect would explain more of the readings" if explainable else ""
-        steps.append(NextStep("calibrate", f"Calibrate with `model=geometric`{also}."))
+        also = " No joint effect would explain more of the readings." if explainable else ""
+        steps.append(NextStep("calibrate", f"Calibrate the robot.{also}"))
     return most_useful_first(steps)
 
 

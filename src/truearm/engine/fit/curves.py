@@ -54,6 +54,8 @@ _STEPS: Final = 40
 _NEGLIGIBLE: Final = 0.01
 #: Share of the best seen combination of coefficients below which one is not seen.
 _ALIKE_EQUATIONS: Final = 1e-9
+#: Share of the equations that is rounding.
+ROUNDING: Final = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +132,8 @@ def moments_without(moments: Array, others: int) -> Array:
             residuals, ``(others + coefficients + 1, others + coefficients + 1)``.
         others: How many other parameters there are.
     """
-    root = np.linalg.cholesky(moments[:others, :others] + np.eye(others))
+    own = moments[:others, :others]
+    root = np.linalg.cholesky(own + max(1.0, ROUNDING * float(np.trace(own))) * np.eye(others))
     shared = np.linalg.solve(root, moments[:others, others:])
     return np.asarray(moments[others:, others:] - shared.T @ shared)
 

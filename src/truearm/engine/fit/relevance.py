@@ -16,7 +16,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.fit.curves import NO_CURVES, CurveMoments, curve_moments, moments_without
+from truearm.engine.fit.curves import NO_CURVES, ROUNDING, CurveMoments, curve_moments, moments_without
 from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.compliance import Compliance
@@ -151,7 +151,10 @@ def _climbed(
     noise = 1.0
     for _ in range(_STEPS):
         root = np.sqrt(variance)[group]
-        H = root[:, None] * A * root / noise + np.eye(len(root))
+        scaled = root[:, None] * A * root
+        least = ROUNDING * float(np.trace(scaled))
+        noise = max(noise, least)
+        H = scaled / noise + np.eye(len(root))
         inverse = np.linalg.inv(np.linalg.cholesky(H))
         half = inverse @ (root * b) / noise
         w = root * (inverse.T @ half)
@@ -164,7 +167,7 @@ def _climbed(
         new = np.clip(new, _LEAST**2, _MOST**2)
         if noisy:
             rest = squares - 2.0 * float(b @ w) + float(w @ A @ w)
-            noise = max(rest, 1e-6 * squares) / max(rows - known.sum(), 0.1 * rows)
+            noise = max(max(rest, 1e-6 * squares) / max(rows - known.sum(), 0.1 * rows), least)
         change = np.abs(np.log(new / variance)).max(initial=0.0)
         variance = new
         if change < _SETTLED:

@@ -4,6 +4,6 @@
 set -e
 cd "$(dirname "$0")"
 truearm show my_robot.yaml
-truearm calibrate my_robot.yaml measurements.csv --model geometric --out result
+truearm calibrate my_robot.yaml measurements.csv --out result
 truearm validate result/calibrated.yaml check.csv
 echo "Open result/report.html in a browser."

@@ -23,7 +23,9 @@ from truearm.studio.window import Window
 
 #: The course of a fit is drawn so often at most [s].
 _PAUSE: Final = 0.5
-_MODELS: Final = (*(model.name for model in MODELS), AUTO, FRAMES.name)
+_MODELS: Final = (AUTO, *(model.name for model in MODELS), FRAMES.name)
+#: What stands for the model that robot and data ask for.
+_BY_DEFAULT: Final = "by default"
 _STALE: Final = OTHER_SETTINGS(
     "The figures below were made with another robot, measurements, payload, exclusions or settings than are chosen "
     "now. Calibrate again, or look at the page Proof: it says what the result is of, and what differs."
@@ -39,7 +41,7 @@ class CalibratePage:
         self._window = window
         gui, settings = window.gui, window.project.settings
         self._data = gui.add_dropdown("Measurements", (NONE,))
-        self._model = gui.add_dropdown("Model", _MODELS, initial_value=AUTO)
+        self._model = gui.add_dropdown("Model", (_BY_DEFAULT,))
         self._train: Any = gui.add_text("Train on", "", hint="configurations, or all; empty for 70 %")
         self._seed: Any = gui.add_text("Seed", str(settings.seed), hint="of the split, a whole number from 0 on")
         self._loss = gui.add_dropdown("Loss", tuple(LOSSES))
@@ -54,7 +56,7 @@ class CalibratePage:
         self._judged = gui.add_html("")
         self._said = gui.add_html("")
         self._data.on_update(window.action(lambda: choose_measurements(window, chosen(self._data))))
-        self._model.on_update(window.action(lambda: window.edit(model=self._model.value)))
+        self._model.on_update(window.action(lambda: window.edit(model=chosen(self._model, _BY_DEFAULT))))
         self._train.on_update(window.settled(lambda: window.edit(train=_train(self._train.value))))
         self._seed.on_update(window.settled(lambda: window.edit(seed=_whole(self._seed.value, "seed"))))
         self._loss.on_update(window.action(lambda: window.edit(loss=self._loss.value)))
@@ -65,7 +67,7 @@ class CalibratePage:
         self._draw()
         settings = self._window.project.settings
         offer(self._data, self._window.project.names(".csv"), settings.data)
-        offer(self._model, _MODELS, settings.model, None)
+        offer(self._model, _MODELS, settings.model, _BY_DEFAULT)
         offer(self._loss, LOSSES, settings.loss, None)
         self._train.value = "" if settings.train is None else str(settings.train)
         self._seed.value = str(settings.seed)

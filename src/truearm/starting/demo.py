@@ -71,6 +71,8 @@ class Demonstration(Record):
 
 #: The program that is corrected, and where its work object is in the controller's base: the numbers it has itself.
 _PLATE: Final = "plate.mod"
+#: Readings of the plate's place that the tracker averages: what is left of their noise shifts the whole program.
+_PLATE_READINGS: Final = 100
 _PLATE_FRAME: Final = Transform((0.31, -0.11, 0.06))
 #: Lowest and highest joint positions [deg] that the thesis measures at (section 2.5), within the robot's limits.
 _REGION: Final = ((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
@@ -115,7 +117,8 @@ def _corrected_plate(
     """Correct a program for a plate that the tracker measured, and send the twin there with both programs."""
     # The thesis counts the height of axis 1 to the base: the base plate is where the nominal robot agrees best.
     place = twin.robot.base.matrix @ best_agreement(twin.robot)[0] @ _PLATE_FRAME.matrix
-    x, y, z = (f"{1e3 * v:.3f}" for v in place[:3, 3] + rng.normal(0.0, 0.03e-3, 3))
+    read = place[:3, 3] + rng.normal(0.0, 0.03e-3, (_PLATE_READINGS, 3))
+    x, y, z = (f"{1e3 * v:.3f}" for v in read.mean(axis=0))
     quaternion = ", ".join(f"{v:.7f}" for v in Transform.from_matrix(place[:3, :3], place[:3, 3]).quaternion)
     cell = folder / "cell.yaml"
     write_files(folder, {cell.name: _CELL.format(place=f"{x}, {y}, {z}", quaternion=quaternion)})

@@ -34,6 +34,7 @@ from truearm.engine.command.arguments import (
 from truearm.engine.command.split import TRAINING_DATA, changed_since, training_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, Spread, errors_of
+from truearm.engine.diagnose.expected_error import error_by_order
 from truearm.engine.diagnose.external_force import check_force, check_payload
 from truearm.engine.diagnose.least_error import Kind, LeastError, least_errors
 from truearm.engine.diagnose.next_step import NextStep
@@ -306,6 +307,8 @@ def _judged(asked: Validate, read: _Read) -> _Judged:
     return _Judged(judged, errors, refit, tuple(mistaken))
 
 
+#: What warming up moves the targets by, from which it is said [m].
+_WARMED: Final = 5e-6
 OTHER_SESSION: Final = Rule(
     "other-session",
     "note",
@@ -317,6 +320,8 @@ def _of_another_session(robot: Robot, data: Dataset) -> tuple[Dataset, list[Noti
     """Return readings without their numbers, where these would say how warm the arm was in the session of the fit."""
     if data.number is None or LEFT not in robot.parameters:
         return data, []
+    if error_by_order(robot, replace(data, approach=None)) < _WARMED:
+        return replace(data, number=None), []
     words = (
         "The robot grew while it warmed up in the session that it was calibrated in. How warm it was in this one "
         "nobody knows, so it is judged as in the middle of that session."

@@ -33,7 +33,7 @@ RANK_LOSS: Final = Rule(
 )
 PRIORS_DECIDE: Final = Rule(
     "priors-decide",
-    "warning",
+    "error",
     "of every effect at once: as `rank-loss`, but the priors say what the data do not, and the expected error holds it",
 )
 CLOSED_LOOP: Final = Rule(

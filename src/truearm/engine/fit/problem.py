@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -375,14 +375,17 @@ class Evaluation:
         return {}
 
 
-def check_circumstances(robot: Robot, data: Dataset) -> None:
+def check_circumstances(robot: Robot, data: Dataset, freed: Collection[str]) -> None:
     """Refuse joint effects that need to know what the data do not tell.
+
+    Args:
+        freed: Names of the effects that are found from the data. Of others an unknown order is an error of predictions.
 
     Raises:
         InputError: Naming the effect and what is missing.
     """
     for effect in robot.effects:
-        if effect.ordered and (data.approach is None or data.number is None):
+        if effect.ordered and effect.name in freed and (data.approach is None or data.number is None):
             raise InputError(
                 f"the effect {effect.name} needs the order in which the configurations were measured",
                 where=data.source,

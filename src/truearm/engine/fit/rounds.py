@@ -118,7 +118,7 @@ def find_parameters(
     """
     robot = robot.marked(data.simulated)
     start = start_from_readings(model.prepared(robot), data, fixed) if near is None else model.prepared(robot)
-    check_circumstances(start, data)
+    check_circumstances(start, data, model.effects)
     free = fixed.free_of(unanchored(model.free(start), data), start)
     if redundancy != "prior":  # what is known of an instrument's scale is a prior: without any it is exact
         free = free.without([SCALE])

@@ -314,7 +314,7 @@ def test_the_command_holds_as_the_job_does(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(csv_text(data))
     frames_of(twin.robot, tmp_path / "frames.yaml")
     words = ["calibrate", "irb120", str(tmp_path / "data.csv"), "--hold", "base, 1", "--hold", "2"]
-    words += ["--model=geometric", "--out", str(tmp_path / "out")]
+    words += ["--out", str(tmp_path / "out")]
     outcome = CliRunner().invoke(program(), [*words, "--details", "--frames", str(tmp_path / "frames.yaml")])
     assert outcome.exit_code == 0, outcome.output
     assert "Held at known places: base, target 1, target 2" in outcome.output

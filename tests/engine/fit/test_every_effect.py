@@ -453,3 +453,13 @@ def test_what_the_data_do_not_tell_is_counted_and_not_listed() -> None:
     (partial,) = (notice for notice in check_fit(fit, expected_error(fit)) if notice.code == "urdf-partial")
     assert "compliance" in partial.message
     assert "link-bending" not in partial.message
+
+
+def test_readings_without_noise_are_no_trouble() -> None:
+    rng = np.random.default_rng(0)
+    robot = irb120()
+    twin = truth_twin(robot, "random", rng)
+    data = measure(twin, robot.random_configurations(30, rng), 0.0, rng)
+    fit = identify_every_effect(robot, data)[1]
+    assert fit.status is Status.CONVERGED
+    assert expected_error(fit).overall.mean < 1e-4

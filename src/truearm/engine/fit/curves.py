@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.engine.fit.likelihood import Visits, Whitening
-from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.problem import NOISE_FLOOR, Problem
 from truearm.engine.fit.variance_components import CovariancePart
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.joint_curve import PRIOR, JointCurve
@@ -54,8 +54,6 @@ _STEPS: Final = 40
 _NEGLIGIBLE: Final = 0.01
 #: Share of the best seen combination of coefficients below which one is not seen.
 _ALIKE_EQUATIONS: Final = 1e-9
-#: Share of the equations that is rounding.
-ROUNDING: Final = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +130,7 @@ def moments_without(moments: Array, others: int) -> Array:
             residuals, ``(others + coefficients + 1, others + coefficients + 1)``.
         others: How many other parameters there are.
     """
-    own = moments[:others, :others]
-    root = np.linalg.cholesky(own + max(1.0, ROUNDING * float(np.trace(own))) * np.eye(others))
+    root = factored(moments[:others, :others] + np.eye(others))[0]
     shared = np.linalg.solve(root, moments[:others, others:])
     return np.asarray(moments[others:, others:] - shared.T @ shared)
 
@@ -191,11 +188,11 @@ class Marginal:
         self.estimate = np.zeros(len(variance))
         if used.sum() <= len(of.F):
             self._part: Array | None = None
-            self._triangle, logs = _factored(np.eye(len(v)) + root[:, None] * of.H[np.ix_(used, used)] * root)
+            self._triangle, logs = factored(np.eye(len(v)) + root[:, None] * of.H[np.ix_(used, used)] * root)
             self.estimate[used] = root * _solved(self._triangle, root * b)
         else:
             self._part = part = of.F[:, used] * root
-            self._triangle, logs = _factored(np.eye(len(part)) + part @ part.T)
+            self._triangle, logs = factored(np.eye(len(part)) + part @ part.T)
             self.estimate[used] = root * (part.T @ _solved(self._triangle, of.z))
         c = self.estimate[used]
         explained = float(b @ c)
@@ -223,7 +220,7 @@ class Marginal:
         return self.at(np.where(coefficients, 0.0, self.variance), self.noise).likelihood
 
 
-def _factored(matrix: Array) -> tuple[Array, float]:
+def factored(matrix: Array) -> tuple[Array, float]:
     """Return the lower triangle by Cholesky of a matrix that is not below 1, and the logarithm of its determinant.
 
     The logarithm is infinite where rounding left the matrix indefinite.
@@ -235,6 +232,12 @@ def _factored(matrix: Array) -> tuple[Array, float]:
         rows = np.sqrt(np.maximum(sizes, 1.0))[:, None] * axes.T
         return np.asarray(np.linalg.qr(rows)[1].T), np.inf
     return np.asarray(triangle), 2.0 * float(np.log(np.diag(triangle)).sum())
+
+
+def inverse_of(matrix: Array) -> Array:
+    """Return the inverse of a matrix that is not below 1, which rounding leaves between 0 and 1."""
+    half = np.linalg.inv(factored(matrix)[0])
+    return np.asarray(half.T @ half)
 
 
 def _solved(triangle: Array, right: Array) -> Array:
@@ -400,7 +403,7 @@ def curve_covariance(
     expected = np.concatenate([expected, np.maximum(variance, _CERTAIN)])
     root = np.where(certain, 0.0, np.sqrt(expected))
     H = root[:, None] * of.moments[:-1, :-1] * root
-    C = np.linalg.inv(H + np.eye(len(root)))
+    C = inverse_of(H + np.eye(len(root)))
     mean = root * (C @ (root * of.moments[:-1, -1]))
     off = np.where(certain, 0.0, of.away - mean)
     missing = np.outer(off, off)
@@ -463,6 +466,9 @@ def _levels(
 
 #: How often stiffness is found: the noise that is left without a curve is not that with it.
 _ROUNDS_CURVES: Final = 2
+#: Deviation of readings in sums of products at least [m, rad]: of smaller ones rounding is larger than what the priors
+#: know.
+_SUMMED_FLOOR: Final = 1e-7
 #: Equations whose products are summed at once.
 _AT_ONCE: Final = 3000
 #: Degrees of freedom of the level of the errors: variances of curves are known from a few dozen lines, and what errs
@@ -578,7 +584,7 @@ def with_stiffness(
         problem,
         robot=robot.with_values(fixed),
         free=free,
-        noise={name: ratio * deviation for name, deviation in problem.noise.items()},
+        noise={name: max(ratio * deviation, NOISE_FLOOR) for name, deviation in problem.noise.items()},
         widened=1.0 if joining else max(1.0, problem.widened * ratio),
     )
     known = replace(
@@ -603,7 +609,8 @@ def curve_moments(problem: Problem, curves: Curves, joints: Array, weight: Array
     """
     names, robot = curves.names, problem.robot
     others = [p for p in problem.free.parameters if p.name not in curves.places]
-    whole = replace(problem, free=FreeParameters((*others, *(robot.parameters[name] for name in names))))
+    noise = {name: max(deviation, _SUMMED_FLOOR) for name, deviation in problem.noise.items()}
+    whole = replace(problem, noise=noise, free=FreeParameters((*others, *(robot.parameters[name] for name in names))))
     evaluation = whole.at(whole.free.start)
     prior = np.array([p.prior for p in others])
     whitening = None

@@ -37,6 +37,8 @@ SETUP: Final = "setup"
 #: Derivatives that are in memory at once where those of all readings are not needed together.
 _AT_ONCE: Final = 2_000_000
 
+#: Deviation that readings are taken to have at least [m, rad].
+NOISE_FLOOR: Final = 1e-9
 #: Equations of a problem, all of them or those with these indices.
 Rows = slice | NDArray[np.intp]
 

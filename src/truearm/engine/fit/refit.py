@@ -21,7 +21,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.statistics import Errors
-from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.problem import NOISE_FLOOR, Problem
 from truearm.engine.fit.start_values import with_fixtures_of
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import FreeParameters
@@ -40,7 +40,6 @@ _LEAST_SEEN: Final = 1e-6
 _LEAST_LEFT: Final = 0.02
 #: Rounds in which deviations of readings that declare none are found.
 _NOISE_ROUNDS: Final = 3
-_NOISE_FLOOR: Final = 1e-9
 
 Places = dict[str, Transform | tuple[float, float, float]]
 
@@ -269,7 +268,7 @@ def _noise_of(linear: _Linear, noise: dict[str, float]) -> dict[str, float]:
         first += block.rows
     for name, parts in squares.items():
         factor = float(np.sqrt(correction * np.mean(np.concatenate(parts))))
-        seen[name] = max(noise[name] * factor, _NOISE_FLOOR)
+        seen[name] = max(noise[name] * factor, NOISE_FLOOR)
     return seen
 
 

@@ -16,8 +16,15 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.fit.curves import NO_CURVES, ROUNDING, CurveMoments, curve_moments, moments_without
-from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.curves import (
+    NO_CURVES,
+    CurveMoments,
+    curve_moments,
+    factored,
+    inverse_of,
+    moments_without,
+)
+from truearm.engine.fit.problem import NOISE_FLOOR, Problem
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.compliance import Compliance
 from truearm.engine.robot.effects.joint_curve import JointCurve
@@ -113,7 +120,7 @@ def with_sizes(
     moved = np.inf if first else np.abs(np.log(deviation / sizes.deviation)) * np.minimum(known, 1.0)
     prior = free.prior
     prior[graded] = unit * deviation[group]
-    factor = min(1.0, float(np.sqrt(noise)))
+    factor = max(min(1.0, float(np.sqrt(noise))), NOISE_FLOOR / min(problem.noise.values()))
     weighed = replace(
         problem,
         free=FreeParameters(tuple(replace(p, prior=float(d)) for p, d in zip(free.parameters, prior, strict=True))),
@@ -151,11 +158,8 @@ def _climbed(
     noise = 1.0
     for _ in range(_STEPS):
         root = np.sqrt(variance)[group]
-        scaled = root[:, None] * A * root
-        least = ROUNDING * float(np.trace(scaled))
-        noise = max(noise, least)
-        H = scaled / noise + np.eye(len(root))
-        inverse = np.linalg.inv(np.linalg.cholesky(H))
+        H = root[:, None] * A * root / noise + np.eye(len(root))
+        inverse = np.linalg.inv(factored(H)[0])
         half = inverse @ (root * b) / noise
         w = root * (inverse.T @ half)
         told = np.asarray(1.0 - (inverse**2).sum(axis=0), dtype=np.float64)
@@ -167,7 +171,7 @@ def _climbed(
         new = np.clip(new, _LEAST**2, _MOST**2)
         if noisy:
             rest = squares - 2.0 * float(b @ w) + float(w @ A @ w)
-            noise = max(max(rest, 1e-6 * squares) / max(rows - known.sum(), 0.1 * rows), least)
+            noise = max(rest, 1e-6 * squares) / max(rows - known.sum(), 0.1 * rows)
         change = np.abs(np.log(new / variance)).max(initial=0.0)
         variance = new
         if change < _SETTLED:
@@ -194,7 +198,7 @@ def expected_sizes(sizes: Sizes, of: CurveMoments, curves: Array, names: Sequenc
     if not sizes:
         return expected
     root = np.concatenate([expected, np.sqrt(curves)])
-    C = np.linalg.inv(root[:, None] * of.moments[:-1, :-1] * root + np.eye(len(root)))
+    C = inverse_of(root[:, None] * of.moments[:-1, :-1] * root + np.eye(len(root)))
     mean = C @ (root * of.moments[:-1, -1])
     place = np.array([sizes.place.get(name, -1) for name in names])
     for k, (now, scale) in enumerate(zip(sizes.deviation.tolist(), sizes.scale.tolist(), strict=True)):

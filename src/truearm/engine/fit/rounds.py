@@ -22,6 +22,7 @@ from truearm.engine.fit.likelihood import Linearised, Visits, WhitenedProblem, W
 from truearm.engine.fit.losses import Loss, norms_of, scale_of, weighed_together
 from truearm.engine.fit.models import Model
 from truearm.engine.fit.problem import (
+    NOISE_FLOOR,
     SETUP,
     Evaluation,
     Problem,
@@ -45,7 +46,6 @@ Redundant = Literal["prior", "drop", "none"]
 
 #: Noise assumed for readings that declare none, until their own residuals say better [m, rad].
 _FIRST_NOISE: Final = {observation.name: 1e-4 for observation in OBSERVATIONS}
-_NOISE_FLOOR: Final = 1e-9
 #: Share of the equations that parameters may use up, for what a robust loss leaves to tell the noise.
 _LARGEST_SHARE_SPENT: Final = 0.8
 #: Numbers that parameters must leave for a least-squares fit to tell the noise: with fewer, no noise at all and
@@ -464,7 +464,7 @@ def estimated_components(
         alike = [np.array([i]) for i in range(len(kinds))]
     free = [name not in (DECLARED, SETUP, *untold) for name in names]
     least = np.array(
-        [(_NOISE_FLOOR / problem.noise[n]) ** 2 if f else _LEAST_WIDENED for f, n in zip(free, names, strict=True)]
+        [(NOISE_FLOOR / problem.noise[n]) ** 2 if f else _LEAST_WIDENED for f, n in zip(free, names, strict=True)]
     )
     if before is not None:
         components = variance_components(at, before.estimated, least, alike, before)
@@ -508,7 +508,7 @@ def _with_components(problem: Problem, components: Components, joints: Array) ->
         if name == DECLARED:
             widened = max(1.0, widened * factor**0.5)
         elif name != SETUP:
-            noise[name] = max(noise[name] * factor**0.5, _NOISE_FLOOR)
+            noise[name] = max(noise[name] * factor**0.5, NOISE_FLOOR)
     next_problem = replace(problem, noise=noise, widened=widened)
     before, after = np.sqrt(joints), np.sqrt(components.weighing.joints)
     change = float(np.max(np.abs(after - before) / np.maximum(np.maximum(after, before), 1e-300), initial=0.0))
@@ -524,7 +524,7 @@ def _with_scale(problem: Problem, solution: Solution, loss: Loss) -> tuple[Probl
     wider = excess_of(known) if known and not problem.data.anchored else 1.0
     for name, (estimate, _) in estimates.items():
         if name in undeclared:
-            noise[name] = max(estimate * noise[name], _NOISE_FLOOR)
+            noise[name] = max(estimate * noise[name], NOISE_FLOOR)
     next_problem = replace(problem, noise=noise, widened=problem.widened * wider)
     return next_problem, _noise_change(problem, next_problem)
 

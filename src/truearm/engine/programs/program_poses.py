@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -137,6 +138,18 @@ def edits_of(program: Program, numbers: dict[int, Array]) -> list[Edit]:
                         Edit(target.source, *span, target.form.absent[number].format(word) if absent else word)
                     )
     return edits
+
+
+def after_edits(targets: Iterable[ProgramTarget], edits: Iterable[Edit]) -> Iterator[ProgramTarget]:
+    """Go through targets as they are read when their text is edited; each edit has the place of a number."""
+    words: dict[int, dict[int, str]] = {}
+    for source, start, _, text in edits:
+        words.setdefault(source, {})[start] = text
+    for target in targets:
+        new = words.get(target.source, {})
+        numbers = zip(target.values, target.places, strict=True)
+        values = [float(new.get(place[0], value)) if place else value for value, place in numbers]
+        yield replace(target, values=tuple(values))
 
 
 def _poses(form: Form, values: Array) -> Array:

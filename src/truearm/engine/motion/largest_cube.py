@@ -9,7 +9,6 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.motion.cube import Cube
@@ -153,6 +152,8 @@ def joints_at(
     """
     joints = np.zeros((len(points), len(robot.joints)))
     regular, reached = np.zeros((2, len(points)), dtype=bool)
+    from scipy.spatial import cKDTree
+
     turning = [joint.kind == "revolute" for joint in robot.joints]
     starts = robot.random_configurations(_STARTS, rng)
     starts[:, turning] = (starts[:, turning] + np.pi) % (2 * np.pi) - np.pi  # a second turn teaches nothing
@@ -244,6 +245,8 @@ class _Search:
         self._ahead = np.zeros(3)
         self._ahead["xy".index(ahead[1])] = 1.0 if ahead[0] == "+" else -1.0
         self._joints = robot.random_configurations(_SAMPLES, np.random.default_rng(0))
+        from scipy.spatial import cKDTree
+
         self._limits, self._tip = limits(robot), Tip(robot, target)
         tips = self._tip.positions(self._joints)
         self._length = float(np.linalg.norm(tips, axis=1).max())  # the reach

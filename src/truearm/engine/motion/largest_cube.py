@@ -150,10 +150,10 @@ def joints_at(
             reached.
         reached: ``(n,)``.
     """
-    joints = np.zeros((len(points), len(robot.joints)))
-    regular, reached = np.zeros((2, len(points)), dtype=bool)
     from scipy.spatial import cKDTree
 
+    joints = np.zeros((len(points), len(robot.joints)))
+    regular, reached = np.zeros((2, len(points)), dtype=bool)
     turning = [joint.kind == "revolute" for joint in robot.joints]
     starts = robot.random_configurations(_STARTS, rng)
     starts[:, turning] = (starts[:, turning] + np.pi) % (2 * np.pi) - np.pi  # a second turn teaches nothing
@@ -241,12 +241,12 @@ def largest_cube(
 
 class _Search:
     def __init__(self, robot: Robot, target: str | None, ahead: Direction, nearest: float, floor: float) -> None:
+        from scipy.spatial import cKDTree
+
         self._robot, self._nearest, self._floor = robot, nearest, floor
         self._ahead = np.zeros(3)
         self._ahead["xy".index(ahead[1])] = 1.0 if ahead[0] == "+" else -1.0
         self._joints = robot.random_configurations(_SAMPLES, np.random.default_rng(0))
-        from scipy.spatial import cKDTree
-
         self._limits, self._tip = limits(robot), Tip(robot, target)
         tips = self._tip.positions(self._joints)
         self._length = float(np.linalg.norm(tips, axis=1).max())  # the reach

@@ -230,8 +230,10 @@ class _Candidates:
         """Turn joints whose turn is not given near to zero, and prefer candidates within the limits."""
         free = ~self._fixed
         self._low, self._high = limits(self._nominal)
-        near_zero = nearest_turns(self._nominal, self._joints, np.zeros(self._joints.shape[2]))
-        self._joints = np.where(free, near_zero, self._joints)
+        zero = np.zeros(self._joints.shape[2])
+        for first in range(0, len(self._joints), AT_ONCE // SLOTS):
+            joints, turning = (values[first : first + AT_ONCE // SLOTS] for values in (self._joints, free))
+            np.copyto(joints, nearest_turns(self._nominal, joints, zero), where=turning)
         beyond: NDArray[np.bool_] = np.asarray(beyond_limits(self._nominal, self._joints, _SLACK).any(axis=2))
         within: NDArray[np.bool_] = self._possible & ~beyond
         self._possible = np.asarray(np.where(within.any(axis=1, keepdims=True), within, self._possible))

@@ -372,13 +372,14 @@ class ProgramCorrection(Record):
 
     def _written_targets(self) -> dict[Path, list[ProgramTarget]]:
         """Return the targets of the new texts, by their files."""
-        corrections = self.result.corrections
-        if self.splits or any(edit.start == edit.stop for correction in corrections for edit in correction.edits):
-            programs = self.as_written()
-        else:  # as many targets as before: what was written is known, and long programs take long to read
-            programs = tuple(
-                replace(c.program, targets=tuple(after_edits(c.program.targets, c.edits))) for c in corrections
-            )
+        programs: list[Program] = []
+        for correction in self.result.corrections:
+            # Long programs take long to read: where they have as many targets as before, what was written is known.
+            targets = None if self.splits else after_edits(correction.program.targets, correction.edits)
+            if targets is None:
+                programs = [*self.as_written()]
+                break
+            programs.append(replace(correction.program, targets=tuple(targets)))
         return {path: targets for program in programs for path, targets in program.by_file().items()}
 
     def written_at(self, out: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -23,8 +23,9 @@ from truearm.engine.programs.corrected_targets import LedgerEntry, corrected_dig
 from truearm.engine.programs.correction import Correction, Shared, shared_motion
 from truearm.engine.programs.expected_errors import REPEATABILITY
 from truearm.engine.programs.gauge import turns_between
-from truearm.engine.programs.program import Program, Skipped, Source
+from truearm.engine.programs.program import Program, ProgramTarget, Skipped, Source
 from truearm.engine.programs.program_files import ProgramFile, language_called, read_sources, recorded, write_programs
+from truearm.engine.programs.program_poses import after_edits
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.entries import controller_summary
@@ -369,6 +370,18 @@ class ProgramCorrection(Record):
         language = language_called(self.files[0].language)
         return read_sources(language, [Source(file.file.path, file.text.decode("latin-1")) for file in self.files])
 
+    def _written_targets(self) -> dict[Path, list[ProgramTarget]]:
+        """Return the targets of the new texts, by their files."""
+        programs: list[Program] = []
+        for correction in self.result.corrections:
+            # Long programs take long to read: where they have as many targets as before, what was written is known.
+            targets = None if self.splits else after_edits(correction.program.targets, correction.edits)
+            if targets is None:
+                programs = [*self.as_written()]
+                break
+            programs.append(replace(correction.program, targets=tuple(targets)))
+        return {path: targets for program in programs for path, targets in program.by_file().items()}
+
     def written_at(self, out: str) -> str:
         """Return the line that says where it was written."""
         return f"Written to {out}, with the report {REPORT}"
@@ -388,7 +401,7 @@ class ProgramCorrection(Record):
         progress("drawing the report")
         files: dict[str, str | bytes] = {}
         entries = []
-        written = {path: targets for program in self.as_written() for path, targets in program.by_file().items()}
+        written = self._written_targets()
         for file in self.files:
             path = file.file.path
             targets = corrected_digests(file.correction.program.by_file()[path], written[path])

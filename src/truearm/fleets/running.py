@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NoReturn
 
 from truearm.calibration.calibrate import calibrate
-from truearm.calibration.calibrating import ACCEPTED
-from truearm.calibration.result import RESULT_FILES
 from truearm.engine.base.errors import InputError, Words, counted, kind_of, refusals_of, with_parameters
 from truearm.engine.base.files import noted_reads, path_argument
 from truearm.engine.base.parts import Cluster, done_parts
@@ -63,10 +61,16 @@ def check_options(asked: Manifest) -> None:
 
 
 def _try(robots: list[RobotEntry]) -> None:
+    from truearm.calibration.calibrating import ACCEPTED  # with all that a calibration needs, only for measured robots
+
+    def stop(words: str) -> None:
+        if words == ACCEPTED:
+            raise _AcceptedError
+
     refused: InputError | None = None
     for robot in robots:
         try:
-            calibrate(robot.robot, robot.data, **robot.options, progress=_stop)
+            calibrate(robot.robot, robot.data, **robot.options, progress=stop)
         except _AcceptedError:
             return
         except InputError as error:
@@ -102,11 +106,6 @@ def _in_the_manifest(error: InputError, place: str) -> InputError:
     )
 
 
-def _stop(words: str) -> None:
-    if words == ACCEPTED:
-        raise _AcceptedError
-
-
 def _place_of(error: InputError, robot: RobotEntry) -> str | None:
     """Return where the option stands that is refused; None where nothing but the robot's files is wrong."""
     named = [name for name in (error.parameter or "").split(", ") if name in OPTIONS]
@@ -119,6 +118,8 @@ def check_folders(asked: Manifest, folder: Path) -> None:
     Raises:
         InputError: Naming the file.
     """
+    from truearm.calibration.result import RESULT_FILES
+
     within = folder / ROBOTS
     for robot in asked.robots:
         own = within / robot.name

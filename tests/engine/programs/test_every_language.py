@@ -30,7 +30,7 @@ from truearm.engine.programs.program import (
     correction_comment,
 )
 from truearm.engine.programs.program_files import language_called
-from truearm.engine.programs.program_poses import edits_of, numbers_of, pose_numbers, poses_of
+from truearm.engine.programs.program_poses import after_edits, edits_of, numbers_of, pose_numbers, poses_of
 
 splitting = pytest.mark.parametrize("language", [one for one in LANGUAGES if one.split], ids=lambda one: one.name)
 languages = pytest.mark.parametrize("language", LANGUAGES, ids=lambda one: one.name)
@@ -155,7 +155,8 @@ def test_a_correction_changes_numbers_of_targets_and_nothing_else(language: Lang
     for sources in samples(language):
         program = language.read(sources)
         numbers = {i: np.array(t.values) + shifted(t) for i, t in enumerate(program.targets)}
-        after = texts(program, edits_of(program, numbers))
+        edits = edits_of(program, numbers)
+        after = texts(program, edits)
         places = [
             [s for t in program.targets if t.source == n for s in t.places if s and s[0] < s[1]]
             for n in range(len(after))
@@ -166,6 +167,9 @@ def test_a_correction_changes_numbers_of_targets_and_nothing_else(language: Lang
         assert [(t.name, t.tool, t.frame, t.configuration) for t in again.targets] == [
             (t.name, t.tool, t.frame, t.configuration) for t in program.targets
         ]
+        known = after_edits(program.targets, edits)
+        assert known is None or [t.values for t in known] == [t.values for t in again.targets]
+        assert known is not None or language.name in ("URScript", "VAL3", "RAPID")
         for index, target in enumerate(again.targets):
             written = [i for i, span in enumerate(target.places) if span is not None and span[0] < span[1]]
             np.testing.assert_allclose(

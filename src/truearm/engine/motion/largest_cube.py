@@ -9,7 +9,6 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.motion.cube import Cube
@@ -151,6 +150,8 @@ def joints_at(
             reached.
         reached: ``(n,)``.
     """
+    from scipy.spatial import cKDTree
+
     joints = np.zeros((len(points), len(robot.joints)))
     regular, reached = np.zeros((2, len(points)), dtype=bool)
     turning = [joint.kind == "revolute" for joint in robot.joints]
@@ -240,6 +241,8 @@ def largest_cube(
 
 class _Search:
     def __init__(self, robot: Robot, target: str | None, ahead: Direction, nearest: float, floor: float) -> None:
+        from scipy.spatial import cKDTree
+
         self._robot, self._nearest, self._floor = robot, nearest, floor
         self._ahead = np.zeros(3)
         self._ahead["xy".index(ahead[1])] = 1.0 if ahead[0] == "+" else -1.0

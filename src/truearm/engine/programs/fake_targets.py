@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from truearm.engine.robot.inverse.pose_solver import JointSolutions, PoseStatus
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import homogeneous
 from truearm.engine.robot.ur_kinematics import controller_robot
+
+#: Poses looked at together: what is computed of them on the way stays in the processor's cache.
+AT_ONCE: Final = 5000
 
 _OnBranch = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
 
@@ -139,14 +143,14 @@ def fake_targets_of(robots: Sequence[Robot], robot_of_row: NDArray[np.intp], fla
         robots: The robot with each load.
         robot_of_row: Index of the robot of each pose, ``(n,)``; `flange` and `near` as for :func:`fake_targets`.
     """
-    if len(robots) == 1:
-        return fake_targets(robots[0], flange, near)
     fakes, parts = np.empty_like(flange), []
     for number in np.unique(robot_of_row).tolist():
-        rows = np.flatnonzero(robot_of_row == number)
-        fake = fake_targets(robots[number], flange[rows], near[rows])
-        fakes[rows] = fake.flange
-        parts.append((rows, fake.solutions))
+        members = np.flatnonzero(robot_of_row == number)
+        for first in range(0, len(members), AT_ONCE):
+            rows = members[first : first + AT_ONCE]
+            fake = fake_targets(robots[number], flange[rows], near[rows])
+            fakes[rows] = fake.flange
+            parts.append((rows, fake.solutions))
     return FakeTargets(fakes, _merged(parts, len(flange)))
 
 

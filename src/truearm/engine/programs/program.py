@@ -299,17 +299,18 @@ def rewritten(text: str, value: float, fewest: int) -> str:
         `fewest`: what is smaller is the rounding of the arithmetic behind it.
     """
     old = float(text)
-    if abs(value - old) < 0.01 * 10.0**-fewest:
+    away = abs(value - old)
+    if away < 0.01 * 10.0**-fewest:
         return text
     decimals = max(decimals_of(text), fewest)
     new = written(value, decimals)
-    return text if float(new) == round(old, decimals) else new
+    return text if away < 2.0 * 10.0**-decimals and float(new) == round(old, decimals) else new
 
 
 def written(value: float, decimals: int) -> str:
     """Return the text of a number with so many decimals; zero has no sign."""
     text = f"{value:.{decimals}f}"
-    return text if float(text) else text.lstrip("-")
+    return text.lstrip("-") if text[0] == "-" and not float(text) else text
 
 
 #: The byte order mark of UTF-8 in a text of one character a byte.
@@ -391,6 +392,8 @@ def comment_of(text: str) -> str | None:
 
     They have a line of their own, without other words before them.
     """
+    if MARK.split()[-1] not in text.lower():
+        return None
     for match in _MARKED.finditer(text):
         before = max(text.rfind("\n", 0, match.start()), text.rfind("\r", 0, match.start())) + 1
         if not re.search("[A-Za-z]", text[before : match.start()]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -137,6 +138,24 @@ def edits_of(program: Program, numbers: dict[int, Array]) -> list[Edit]:
                         Edit(target.source, *span, target.form.absent[number].format(word) if absent else word)
                     )
     return edits
+
+
+def after_edits(targets: Sequence[ProgramTarget], edits: Sequence[Edit]) -> list[ProgramTarget] | None:
+    """Return targets as they are read when their numbers are edited; None where only reading tells.
+
+    That is where a number has no place of its own in the text, or gets one.
+    """
+    if not all(all(target.places) for target in targets) or any(edit.start == edit.stop for edit in edits):
+        return None
+    words: dict[int, dict[int, str]] = {}
+    for source, start, _, text in edits:
+        words.setdefault(source, {})[start] = text
+    new = []
+    for target in targets:
+        own = words.get(target.source, {})
+        numbers = zip(target.values, target.places, strict=True)
+        new.append(replace(target, values=tuple([float(own.get(span[0], old)) for old, span in numbers if span])))
+    return new
 
 
 def _poses(form: Form, values: Array) -> Array:

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.engine.programs.fake_targets import AT_ONCE
 from truearm.engine.programs.program import ANY_POSTURE, Configuration
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.inverse.branch_search import beyond_limits, limits, nearest_turns
@@ -112,8 +113,11 @@ def resolved_configurations(
         return _by_seeds(nominal, flange, configurations, joints, wanted)
     candidates, possible = _every_posture(nominal, flange[wanted], form)
     number, bend = np.full(possible.shape, -1), np.zeros(possible.shape)
-    kinematics = nominal.forward_kinematics(candidates[possible])
-    number[possible], bend[possible] = rule.numbers(kinematics), rule.bend(kinematics)
+    rows, slots = np.nonzero(possible)
+    for first in range(0, len(rows), AT_ONCE):
+        some = rows[first : first + AT_ONCE], slots[first : first + AT_ONCE]
+        kinematics = nominal.forward_kinematics(candidates[some])
+        number[some], bend[some] = rule.numbers(kinematics), rule.bend(kinematics)
     known_kinematics = nominal.forward_kinematics(np.nan_to_num(known))
     known_number, known_bend = rule.numbers(known_kinematics), rule.bend(known_kinematics)
     reachable[wanted] = possible.any(axis=1)
@@ -226,8 +230,10 @@ class _Candidates:
         """Turn joints whose turn is not given near to zero, and prefer candidates within the limits."""
         free = ~self._fixed
         self._low, self._high = limits(self._nominal)
-        near_zero = nearest_turns(self._nominal, self._joints, np.zeros(self._joints.shape[2]))
-        self._joints = np.where(free, near_zero, self._joints)
+        zero = np.zeros(self._joints.shape[2])
+        for first in range(0, len(self._joints), AT_ONCE // SLOTS):
+            joints, turning = (values[first : first + AT_ONCE // SLOTS] for values in (self._joints, free))
+            np.copyto(joints, nearest_turns(self._nominal, joints, zero), where=turning)
         beyond: NDArray[np.bool_] = np.asarray(beyond_limits(self._nominal, self._joints, _SLACK).any(axis=2))
         within: NDArray[np.bool_] = self._possible & ~beyond
         self._possible = np.asarray(np.where(within.any(axis=1, keepdims=True), within, self._possible))
@@ -239,6 +245,9 @@ class _Candidates:
         #: Whether there is a choice.
         self.open: NDArray[np.bool_] = np.asarray((self._possible.sum(axis=1) > 1) | turning)
         self._only = np.argmax(self._possible, axis=1)
+        #: The one candidate on each branch, ``(m, 8)``; -1 where there is none, or several are.
+        on_branch = self._possible[:, :, None] & (self._number[:, :, None] == np.arange(SLOTS))
+        self._on_branch = np.where(on_branch.sum(axis=1) == 1, np.argmax(on_branch, axis=1), -1)
         self._any: NDArray[np.bool_] = np.asarray(self._possible.any(axis=1))
 
     def chosen(self, row: int, reference: Array | None, branch: int | None) -> tuple[Array, int] | None:
@@ -250,20 +259,28 @@ class _Candidates:
             return None
         if not self.open[row]:
             return np.asarray(self._joints[row, self._only[row]]), int(self._only[row])
+        if reference is not None and branch is not None and (only := int(self._on_branch[row, branch])) >= 0:
+            return self._turned(row, only, reference), only
         joints = self._joints[row]
         if reference is None:
             cost = np.abs(joints).max(axis=1) + 1e3 * self._number[row]
         else:
-            turns = np.round((reference - joints) / _TURN) * self._several[row]
-            if turns.any():
-                low = np.ceil((self._low - joints) / _TURN)
-                high = np.floor((self._high - joints) / _TURN)
-                joints = joints + _TURN * np.clip(turns, np.minimum(low, 0.0), np.maximum(high, 0.0))
+            joints = self._turned(row, slice(None), reference)
             cost = np.abs(joints - reference).max(axis=1)
         possible = self._possible[row]
         on_branch = possible & (self._number[row] == branch)
         slot = int(np.argmin(np.where(on_branch if on_branch.any() else possible, cost, np.inf)))
         return np.asarray(joints[slot]), slot
+
+    def _turned(self, row: int, slots: int | slice, reference: Array) -> Array:
+        """Return joints of candidates of a pose, those with a choice in the turn nearest to a reference."""
+        joints = self._joints[row, slots]
+        turns = ((reference - joints) / _TURN).round() * self._several[row, slots]
+        if turns.any():
+            low = np.ceil((self._low - joints) / _TURN)
+            high = np.floor((self._high - joints) / _TURN)
+            joints = joints + _TURN * np.clip(turns, np.minimum(low, 0.0), np.maximum(high, 0.0))
+        return np.asarray(joints)
 
 
 def _by_seeds(

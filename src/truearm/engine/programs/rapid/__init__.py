@@ -53,10 +53,10 @@ def _commented(text: str, lines: Sequence[str]) -> str:
     return text if head is None else with_lines_behind(text, head.end(), [f"  ! {line}" for line in lines], "!")
 
 
-#: A component of a robtarget that is not assigned.
+#: A component of a robtarget that is not assigned. What it can begin with comes first: numbers are passed over at once.
 _READS: Final = re.compile(
-    r"![^\n]*+|\"[^\"\n]*+\"|\b([A-Z]\w*+)(?:\s*+\{[^}\n]*+\})?+\s*+\.\s*+(?:trans|rot)\b"
-    r"(?!(?:\s*+\.\s*+\w++)*+\s*+:=)(?:\s*+\.\s*+\w++)*+",
+    r"(?=[!\"A-Z])(?:![^\n]*+|\"[^\"\n]*+\"|\b([A-Z]\w*+)(?:\s*+\{[^}\n]*+\})?+\s*+\.\s*+(?:trans|rot)\b"
+    r"(?!(?:\s*+\.\s*+\w++)*+\s*+:=)(?:\s*+\.\s*+\w++)*+)",
     re.IGNORECASE,
 )
 

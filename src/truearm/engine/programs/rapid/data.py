@@ -7,7 +7,7 @@ instruction; application manuals Arc and Arc Sensor, Spot options, Dispense, Pai
 from __future__ import annotations
 
 import re
-from functools import cache
+from functools import cache, lru_cache
 from math import isfinite, pi
 from typing import Final, Literal, NamedTuple
 
@@ -130,8 +130,12 @@ def absent(values: tuple[float, ...]) -> bool:
 
 def external_axis_moved(text: str) -> bool:
     """Return whether a robtarget, as it is written, has an external axis that is there and not at zero."""
-    axes = text[text.rindex("[") + 1 :].rstrip("] \t\r\n").split(",")
-    return any(0.0 != float(axis) < _ABSENT for axis in axes)
+    return _moved(text[text.rindex("[") + 1 :])
+
+
+@lru_cache(maxsize=1000)
+def _moved(axes: str) -> bool:
+    return any(0.0 != float(axis) < _ABSENT for axis in axes.rstrip("] \t\r\n").split(","))
 
 
 class RefusedPoseError(Exception):

@@ -30,8 +30,9 @@ from truearm.engine.programs.program import (
 from truearm.engine.programs.rapid.data import RELTOOL, ROBTARGET_TAIL
 from truearm.engine.programs.rapid.syntax import arguments_of, code_of
 
-# ConfL and ConfJ: where the controller does not look at the configuration data of targets.
-_SWITCH: Final = re.compile(r"\bConf([LJ])[ \t]*+\\[ \t]*+(On|Off)\b", re.I)
+# ConfL and ConfJ: where the controller does not look at the configuration data of targets. In small letters, and the
+# word comes first: then it is found at once.
+_SWITCH: Final = re.compile(r"conf(?<=\bconf)([lj])[ \t]*+\\[ \t]*+(on|off)\b")
 
 
 def with_postures_left_free(program: Program) -> Program:
@@ -43,12 +44,12 @@ def with_postures_left_free(program: Program) -> Program:
         kind: [[] for _ in program.sources] for kind in ("straight", "joint")
     }
     for number, source in enumerate(program.sources):
-        if not _SWITCH.search(source.text):
+        if not _SWITCH.search(source.text.lower()):
             continue
         code, lines = code_of(source.text)[0], Lines(source.text)
-        for match in _SWITCH.finditer(code):
-            kind = "straight" if match[1].upper() == "L" else "joint"
-            switches[kind][number].append((lines.number(match.start()), match[2].lower() == "on"))
+        for match in _SWITCH.finditer(code.lower()):
+            kind = "straight" if match[1] == "l" else "joint"
+            switches[kind][number].append((lines.number(match.start()), match[2] == "on"))
     if not any(places for kind in switches.values() for places in kind):
         return program
     looked: set[int] = set()

@@ -171,10 +171,11 @@ def _wrong_bracket(brackets: str) -> int | None:
 
 #: Brackets, commas and backslashes; innermost brackets together with what is in them.
 _MARK: Final = re.compile(r"\[[^\[\](){}]*+\]|[\[\](){},\\]")
-#: What nearly all arguments are: a target, three names, and perhaps a work object. Found at once, as programs are long.
+#: What nearly all arguments are: a target, three names, perhaps a time and a work object. Found at once: programs are
+#: long.
 _USUAL: Final = re.compile(
-    r"\s*+(\w++|\[(?:[^\[\]]++|\[[^\[\]]*+\])*+\])\s*+,\s*+(\w++)\s*+,\s*+(\w++)\s*+,\s*+(\w++)\s*+"
-    r"(?:\\\s*+WObj\s*+:=\s*+(\w++)\s*+)?+",
+    r"\s*+(\w++|\[(?:[^\[\]]++|\[[^\[\]]*+\])*+\])\s*+,\s*+(\w++)\s*+(?:\\\s*+T\s*+:=\s*+([\w.]++)\s*+)?+,"
+    r"\s*+(\w++)\s*+,\s*+(\w++)\s*+(?:\\\s*+WObj\s*+:=\s*+(\w++)\s*+)?+",
     re.I,
 )
 _OPTION: Final = re.compile(r"\\\s*+([^\W\d]\w*+)\s*+(?::=)?+")
@@ -204,8 +205,9 @@ def arguments_of(code: str, start: int, stop: int) -> Arguments:
     """Return the arguments that stand in a span of code, whose brackets must be closed."""
     usual = _USUAL.fullmatch(code, start, stop)
     if usual is not None:
-        _, *needed, frame = usual.regs
-        return Arguments(needed, {} if frame[0] < 0 else {"wobj": frame})
+        _, target, speed, time, zone, tool, frame = usual.regs
+        options = {"t": time, "wobj": frame}
+        return Arguments([target, speed, zone, tool], {name: span for name, span in options.items() if span[0] >= 0})
     arguments = Arguments()
     depth, begin, optional = 0, start, False
     for mark in _MARK.finditer(code, start, stop):

@@ -391,7 +391,12 @@ class Finder:
             tuple(sorted(self.skipped, key=lambda entry: (entry.source, entry.line))),
             dict(self.unknown),
             self.frames.loads(),
-            any(_LOADING.search(code) for code in self.listing.codes),
+            any(
+                _LOADING.search(part)
+                for code in self.listing.codes
+                for part in code.split(";")
+                if "load" in part.lower()
+            ),
         )
 
     def _skip(self, source: int, place: int, reason: str) -> None:

@@ -33,7 +33,7 @@ from truearm.engine.robot.effects.balancing import Balancing
 from truearm.engine.robot.effects.effect import Effect
 from truearm.engine.robot.effects.joint_curve import JointCurve, curve_names
 from truearm.engine.robot.effects.linear_contact import LinearContactClearance
-from truearm.engine.robot.effects.link_bending import bending_names
+from truearm.engine.robot.effects.link_bending import bending_names, moment_names
 from truearm.engine.robot.effects.run_out import run_out_names
 from truearm.engine.robot.effects.transmission import transmission_names
 from truearm.engine.robot.parameters import Parameter
@@ -280,6 +280,7 @@ def _constants(robot: Robot) -> dict[str, str]:
         "BEARING_COMPLIANCE": _rows(by_joint("bearing_compliance"), names),
         "CLEARANCE": _rows(by_joint("clearance"), names),
         "BENDING": _rows([_bending(values, i) for i in numbers], names),
+        "MOMENTS": _rows([_moments(values, i, len(robot.joints)) for i in numbers], names),
         "RUN_OUT": _rows([_run_out(robot, values, i) for i in numbers], names),
         "LINEAR_CONTACT": repr(any(isinstance(effect, LinearContactClearance) for effect in effects)),
         "READINGS": _rows(_tuples(q)),
@@ -324,6 +325,12 @@ def _bending(values: Mapping[str, float], number: int) -> tuple[Row, ...]:
     """Return what gravity's direction does behind a joint, empty where it does nothing."""
     found = np.array([values.get(name, 0.0) for name in bending_names(number)])
     return _tuples(found.reshape(3, 3)) if found.any() else ()
+
+
+def _moments(values: Mapping[str, float], number: int, count: int) -> tuple[tuple[int, Row], ...]:
+    """Return what the weight of each link further out turns a joint by; only of those that do."""
+    rows = {k: tuple(values.get(name, 0.0) for name in moment_names(number, k)) for k in range(number + 1, count + 1)}
+    return tuple((k - 1, row) for k, row in rows.items() if any(row))
 
 
 def _run_out(robot: Robot, values: Mapping[str, float], number: int) -> tuple[Row, ...]:

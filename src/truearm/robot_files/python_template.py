@@ -56,6 +56,9 @@ CLEARANCE: tuple[float, ...] = (0.0,) * 2
 #: By the direction in which gravity falls, in the joint's frame behind its turn: turns about x, y and z for each of its
 #: components; empty for none.
 BENDING: tuple[tuple[tuple[float, float, float], ...], ...] = ((),) * 2
+#: By the weight of links further out: the joint before the link, from 0, and what a joint turns for first moments of it
+#: along x, y and z of that joint's frame; empty for none.
+MOMENTS: tuple[tuple[tuple[int, tuple[float, float, float]], ...], ...] = ((),) * 2
 #: By the joint position, slides along x, y and z of the joint's frame before its turn: sine and cosine; empty for none.
 RUN_OUT: tuple[tuple[tuple[float, float], ...], ...] = ((),) * 2
 #: Whether the contact angle of clearances is taken as linear in the moments.
@@ -143,7 +146,7 @@ def _rotation(axis: int, angle: float | Array) -> Array:
 def _loads(turned: Array, tilted: Array, aside: Array) -> tuple[Array, Array, Array]:
     """Return force and moment of weights and balancers beyond each joint, in its own frame, ``(n, joints, 3)``.
 
-    With them the direction in which gravity falls.
+    With them the axes of the joints ``(n, joints, 3, 3)``.
     """
     joints, links, flange = _frames(turned, tilted, aside)
     bodies = [(joint, mass, links[joint], cog) for joint, mass, cog in MASSES]
@@ -163,8 +166,7 @@ def _loads(turned: Array, tilted: Array, aside: Array) -> tuple[Array, Array, Ar
         for i, (p, R) in enumerate(joints[lower:upper], lower):
             force[:, i] += (drawn[:, None, :] @ R)[:, 0]
             moment[:, i] += (np.cross(moved - p, drawn)[:, None, :] @ R)[:, 0]
-    down = np.array(GRAVITY) / (np.linalg.norm(GRAVITY) or 1.0)
-    return force, moment, np.stack([down @ R for _, R in joints], axis=1)
+    return force, moment, np.stack([R for _, R in joints], axis=1)
 
 
 # -- joint effects
@@ -181,7 +183,7 @@ def _bent(q: Array) -> tuple[Array, Array, Array]:
         for axis, (s, c) in enumerate(waves):
             aside[:, i, axis] = s * np.sin(q[:, i]) + c * np.cos(q[:, i])
     by_load = (COMPLIANCE, COMPLIANCE_QUADRATIC, COMPLIANCE_CUBIC, BACKLASH, BEARING_COMPLIANCE, CLEARANCE)
-    if not np.any(by_load) and not any(BENDING):
+    if not np.any(by_load) and not any(BENDING) and not any(MOMENTS):
         return driven, np.zeros((*q.shape, 2)), aside
 
     def following(rows: NDArray[np.intp], now: Array) -> Array:
@@ -212,7 +214,7 @@ def _by_position(q: Array) -> Array:
     return np.asarray((np.array(GAIN) - 1.0) * q + series)
 
 
-def _by_load(force: Array, moment: Array, fall: Array) -> tuple[Array, Array]:
+def _by_load(force: Array, moment: Array, axes: Array) -> tuple[Array, Array]:
     """Return by how far the joints turn, or slide, and tilt under their loads."""
     m = np.where(SLIDING, force[:, :, 2], moment[:, :, 2])
     turned = np.array(COMPLIANCE) * m + np.array(COMPLIANCE_QUADRATIC) * m * np.abs(m)
@@ -227,11 +229,15 @@ def _by_load(force: Array, moment: Array, fall: Array) -> tuple[Array, Array]:
         side = moment[:, :, :2] / np.where(across > 0.0, across, 1.0)[:, :, None]
     slope = np.tan(CLEARANCE)[:, None] * np.tanh(across / 0.01)[:, :, None] * side
     tilted = np.array(BEARING_COMPLIANCE)[:, None] * moment[:, :, :2] + slope / np.sqrt(1.0 + slope**2)
+    down = np.array(GRAVITY) / (np.linalg.norm(GRAVITY) or 1.0)
     for i, rows in enumerate(BENDING):
         if rows:
-            bent = fall[:, i] @ np.array(rows).T
+            bent = down @ axes[:, i] @ np.array(rows).T
             tilted[:, i] += bent[:, :2]
             turned[:, i] += bent[:, 2]
+    for i, links in enumerate(MOMENTS):
+        for joint, of_link in links:
+            turned[:, i] += np.sum(np.cross(down, axes[:, i, :, 2]) * (axes[:, joint] @ np.array(of_link)), axis=1)
     return turned, tilted
 
 

@@ -28,7 +28,7 @@ from truearm.engine.robot.chain import (
     in_frame_behind,
 )
 from truearm.engine.robot.parts import POINT_MASS, Inertia
-from truearm.engine.robot.postures import Postures
+from truearm.engine.robot.postures import Postures, pairs
 from truearm.engine.robot.wrench import wrench_on_flange
 
 if TYPE_CHECKING:
@@ -135,21 +135,30 @@ def joint_loads(
 
 
 def free_fall(robot: Robot, variables: Array) -> Array:
-    """Return the direction in which gravity falls in the axes of :func:`joint_loads`, ``(joints, 3, n)``.
+    """Return the direction g in which gravity falls, as :attr:`Postures.fall` holds it, ``(joints + pairs, 3, n)``.
 
-    It is that of an arm at rest: a unit vector, or zero where there is no gravity. `variables` are those of
+    It is that of an arm at rest: a unit vector, or zero where there is no gravity. A link with the first moment e turns
+    a joint with the axis z by ``(e x g) z = e (g x z)``: the rows of pairs are ``g x z``. `variables` are those of
     :func:`joint_loads`.
     """
-    found = np.zeros((len(robot.joints), 3, np.shape(variables)[-1]))
+    count = len(robot.joints)
+    rows = {pair: count + place for place, pair in enumerate(pairs(count))}
+    found = np.zeros((count + len(rows), 3, np.shape(variables)[-1]))
+    pulls: dict[int, Coordinates] = {}
     size = math.hypot(*robot.gravity)
     fall: Coordinates = _scaled(robot.gravity, 1.0 / size) if size else _ZERO
     moves = robot.arm.forward_kinematics(variables, robot.values).moves
     for element, move in zip(robot.arm.elements, moves, strict=True):
         if move and element.turns:
             fall = in_frame_behind(fall, element, move)
-        if element.variable is not None and element.variable < len(found):
-            for row, axis in zip(found[element.variable], (*across(element), axis_of(element)), strict=True):
-                row[:] = _along(axis, fall)
+            pulls = {i: in_frame_behind(pull, element, move) for i, pull in pulls.items()}
+        k = element.variable
+        if k is not None and k < count:
+            for place, vector in ((k, fall), *((rows[i, k], pull) for i, pull in pulls.items())):
+                for row, axis in zip(found[place], (*across(element), axis_of(element)), strict=True):
+                    row[:] = _along(axis, vector)
+            if element.turns:
+                pulls[k] = cross(fall, axis_of(element))
     return found
 
 

@@ -34,8 +34,9 @@ class Postures:
     #: Force and moment of everything beyond each joint, in the joint's own axes, ``(joints, 6, n)``, as
     #: :meth:`truearm.engine.robot.robot.Robot.loaded` finds them.
     loads: Array | None = None
-    #: Direction in which gravity falls, in the axes of the loads, ``(joints, 3, n)``, zero without gravity; found with
-    #: the loads where an effect depends on it.
+    #: Direction in which gravity falls, in the axes of the loads, zero without gravity: a row a joint; then a row for
+    #: each of :func:`pairs`, what first moments of the second's link turn the first with, in the axes of the second.
+    #: ``(joints + pairs, 3, n)``, found with the loads where an effect depends on it.
     fall: Array | None = None
     #: What of the loads each balancer contributes at the factor 1, ``(balancers, joints, 6, n)``, and the factors that
     #: the loads are of; None where no factor is a parameter.
@@ -105,6 +106,11 @@ class Postures:
         loads = None if self.loads is None else self.loads[..., first:end]
         fall = None if self.fall is None else self.fall[..., first:end]
         return replace(self.at(np.arange(first, end)), loads=loads, fall=fall, relief=relief)
+
+
+def pairs(count: int) -> list[tuple[int, int]]:
+    """Return the pairs of `count` joints (from 0) of which the second is behind the first."""
+    return [(i, k) for i in range(count) for k in range(i + 1, count)]
 
 
 def approach_of(joints: Array, order: NDArray[np.int64]) -> Array:

@@ -131,6 +131,11 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
         )
         return rows if any(map(any, rows)) else ()
 
+    def moments(number: int) -> tuple[tuple[int, float, float, float], ...]:
+        links = range(number + 1, len(robot.joints) + 1)
+        rows = ((k, of(f"moment_x{k}", number), of(f"moment_y{k}", number), of(f"moment_z{k}", number)) for k in links)
+        return tuple(row for row in rows if any(row[1:]))
+
     def run_out(number: int) -> tuple[tuple[float, float], ...]:
         pairs = tuple((of(f"run_out_{a}_sin", number), of(f"run_out_{a}_cos", number)) for a in "xyz")
         return pairs if any(map(any, pairs)) else ()
@@ -146,6 +151,7 @@ def joint_truths(robot: Robot) -> dict[int, JointTruth]:
             gear=sines(number),
             hysteresis=of("approach", number),
             bending=bending(number),
+            moments=moments(number),
             run_out=run_out(number),
             growth=of("thermal_growth", number),
             warm_up=of("warm_up", number),

@@ -365,6 +365,9 @@ class Posture:
     #: 3)``.
     deflection: Array
     fall: Array  #: Unit vectors ``(joints, 3)`` in which gravity falls, in the axes of the loads; zero without gravity.
+    #: What turns a joint (first) per first moment of a link, in the axes of the joint before it (second), ``(joints,
+    #: joints, 3)``: gravity's direction times the axis of the first.
+    pulls: Array
     #: External force [N] and moment about the flange's origin [N m] on the flange, in base axes, ``(6,)``.
     wrench: Array
 
@@ -376,6 +379,7 @@ class Posture:
             loads=self.loads[row],
             deflection=self.deflection[row],
             fall=self.fall[row],
+            pulls=self.pulls[row],
             wrench=self.wrench[row],
         )
 
@@ -455,7 +459,7 @@ class Twin:
 
         aside = np.stack([truth.carried_aside(joints[:, j]) for j, truth in enumerate(truths)], axis=1)
 
-        def deflections(rows: IntArray, loads: Array, fall: Array) -> Array:
+        def deflections(rows: IntArray, loads: Array, fall: Array, pulls: Array) -> Array:
             deflected = np.zeros((len(rows), len(links), 3))
             for j, (truth, link) in enumerate(zip(truths, links, strict=True)):
                 if truth is not PERFECT:
@@ -463,16 +467,18 @@ class Twin:
                     along = loads[:, j, 5 if link.turns else 2]
                     deflected[:, j, 2] = truth.turn(joints[rows, j], approach[rows, j], along)
                     deflected[:, j] += truth.bent(fall[:, j])
+                    deflected[:, j, 2] += truth.hung(pulls[:, j])
             return deflected
 
         left = np.arange(len(joints))
         nothing = np.zeros((len(left), len(links), 6))
-        settled, settled_postures = deflections(left, nothing, nothing[:, :, :3]), dict[int, Posture]()
+        still = np.zeros((len(left), len(links), len(links), 3))
+        settled, settled_postures = deflections(left, nothing, nothing[:, :, :3], still), dict[int, Posture]()
         for last in (*[False] * (_ROUNDS - 1), True):
             deflection, own = settled, tuple(link.of_rows(left) for link in links)
             given = (aside[left], wrench[left], velocity[left], acceleration[left])
             standing = self._standing(own, geared[left], deflection, *given)
-            settled = deflections(left, standing.loads, standing.fall)
+            settled = deflections(left, standing.loads, standing.fall, standing.pulls)
             rests = (np.abs(settled - deflection).max(axis=(1, 2)) < _SETTLED) | last
             settled_postures |= {int(left[row]): standing.of_row(row) for row in np.flatnonzero(rests).tolist()}
             left, settled = left[~rests], settled[~rests]
@@ -519,12 +525,14 @@ class Twin:
         carried = np.cumsum(weights[:, ::-1], axis=1)[:, ::-1][:, :-1]  # by a joint: its own link and all behind it
         world, at_flange = self._base @ flange[0], np.tile(np.eye(4), (n, 1, 1))
         at_flange[:, :3, 3] = flange[0, :, :3, 3]
+        own, down = np.stack(axes, axis=1)[..., :3, :3], _direction(gravity)
         return Posture(
             links=np.stack(frames, axis=1),
             targets={name: world @ place for name, place in self._targets.items()},
             loads=wrench_at(carried, np.stack(axes, axis=1)),
             deflection=deflection,
-            fall=_direction(gravity) @ np.stack(axes, axis=1)[..., :3, :3],
+            fall=down @ own,
+            pulls=np.einsum("nix,nkxa->nika", np.cross(down, own[..., 2]), own),
             wrench=wrench_at(pushed, at_flange),
         )
 

@@ -47,6 +47,9 @@ class JointTruth:
     #: Turn of the arm about x, y and z of the joint [rad] per x, y and z of the direction in which gravity falls: a row
     #: for each axis turned about; empty where nothing bends.
     bending: tuple[tuple[float, float, float], ...] = ()
+    #: Links further out that turn the joint by their weight, from 1: what the joint turns [rad] for their first moments
+    #: along x, y and z of the joint before the link.
+    moments: tuple[tuple[int, float, float, float], ...] = ()
     #: How far the axis is carried along x, y and z of the joint before its turn [m]: sine and cosine of the position
     #: for each; empty where it stays.
     run_out: tuple[tuple[float, float], ...] = ()
@@ -87,6 +90,10 @@ class JointTruth:
         """Return what the arm turns about x, y and z of the joint [rad] as gravity falls along ``(n, 3)``."""
         about = [sum(row[k] * fall[:, k] for k in range(3)) for row in self.bending]
         return np.stack(about, axis=1) if about else np.zeros(fall.shape)
+
+    def hung(self, pulls: Array) -> Array:
+        """Return what weights of links turn the joint by [rad], ``(n,)``, from pulls on it ``(n, joints, 3)``."""
+        return sum((pulls[:, link - 1] @ np.array(moment) for link, *moment in self.moments), np.zeros(len(pulls)))
 
     def carried_aside(self, position: Array) -> Array:
         """Return how far the axis is carried along x, y and z ``(n, 3)`` [m] at positions ``(n,)``."""

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from truearm.engine.robot.chain import Array, across, axis_of
-from truearm.engine.robot.effects.link_bending import LinkBending, bending_names
+from truearm.engine.robot.effects.link_bending import LinkBending, bending_names, moment_names
 from truearm.engine.robot.effects.run_out import RunOut, run_out_names
 from truearm.engine.robot.lines import at_zero
 from truearm.engine.robot.parameters import Parameter
@@ -29,6 +29,9 @@ def in_its_axes(before: Robot, after: Robot) -> Robot:
         behind, ahead = (new.T @ old for old, new in zip(here, there, strict=True))
         turned |= _seen(before, bending_names(i + 1), behind, behind)
         turned |= _seen(before, run_out_names(i + 1), ahead, np.eye(2))
+        for k in range(i + 1, len(before.joints)):
+            own, new = (_own_axes(robot, k)[0] for robot in (before, after))
+            turned |= _seen(before, moment_names(i + 1, k + 1), new.T @ own, np.eye(1))
     return replace(after, known={**after.known, **turned})
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -72,11 +73,20 @@ def arm() -> Robot:
     return replace(load_robot("li3"), masses=masses, payload=Payload(3.0, (0.02, 0.01, 0.05)))
 
 
-def seen(robot: Robot, count: int, seed: int, *, soft: bool = True, warm_up: float = 0.0, **truths: float) -> Dataset:
+def seen(
+    robot: Robot,
+    count: int,
+    seed: int,
+    *,
+    soft: bool = True,
+    warm_up: float = 0.0,
+    compliances: Mapping[int, float] | None = None,
+    **truths: float,
+) -> Dataset:
     """Return readings of a twin whose joints 2 and 3 do what the truths say."""
     rng = np.random.default_rng(seed)
     twin = truth_twin(robot, "random", np.random.default_rng(1))
-    compliance = SOFT if robot is irb120() else {2: 1e-5, 3: 1e-5}
+    compliance = compliances or (SOFT if robot is irb120() else {2: 1e-5, 3: 1e-5})
     joints = {
         n: JointTruth(compliance=compliance.get(n, 0.0) if soft else 0.0, **(truths if n in (2, 3) else {}))  # type: ignore[arg-type]
         for n in range(1, len(robot.joints) + 1)
@@ -138,6 +148,20 @@ def test_backlash_is_found_where_there_is_some() -> None:
     unseen = seen(irb120(), 200, 20, backlash=math.radians(0.05))
     assert mean_error(fit.robot, unseen) < 1.1 * NOISE * math.sqrt(8.0 / math.pi)
     assert mean_error(identify(irb120(), worn()[0], ELASTIC).robot, unseen) > 1e-4
+
+
+def test_masses_that_the_file_states_wrongly_are_made_up_for() -> None:
+    """Links and payload are 1.4 times as heavy, and lie elsewhere."""
+    rng = np.random.default_rng(0)
+    heavy = tuple(
+        replace(m, mass=1.4 * m.mass, cog=tuple((np.array(m.cog) + rng.normal(0.0, 0.03, 3)).tolist()))
+        for m in irb120().masses
+    )
+    true = replace(irb120(), masses=heavy)
+    data, unseen = (unordered(seen(true, count, seed, compliances=SOFT)) for count, seed in ((60, 4), (200, 20)))
+    told, knows = (mean_error(identify(robot, data, ELASTIC).robot, unseen) for robot in (irb120(), true))
+    assert told > 1.5 * knows
+    assert mean_error(identify_every_effect(irb120(), data)[1].robot, unseen) < 1.1 * knows
 
 
 def test_of_few_readings_it_is_as_good_as_the_elastic_model() -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.commanding import Truearm
 from tests.simulated import campaign
@@ -64,3 +66,11 @@ def test_what_a_result_was_asked_for_gives_the_same_result_again() -> None:
     assert result.because == "loads are not known, and 14 configurations are few"
     assert "model" not in result.request.as_python()
     assert result.request.run().robot.values == result.robot.values
+
+
+def test_lengths_are_too_few_numbers_for_every_effect() -> None:
+    twin, data = campaign("ur5", 40, 1e-5, 1)
+    lengths = replace(data, position=np.full_like(data.position, np.nan))
+    for readings in (lengths, replace(data, fixture=np.zeros(len(data.target), dtype=np.int64))):
+        model, because = Calibrate("ur5", data).model_for(twin.robot, readings)
+        assert (model, because) == ("geometric", "readings are lengths or of fixtures")

@@ -54,7 +54,8 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
         "frames: base, tool and fixtures alone.",
         default=None,
         shown=f"auto where loads are known or {ENOUGH} configurations are trained on, else geometric",
-        more="It is ``geometric`` too with `effects`, `zones`, `monte_carlo`, and a `redundancy` other than ``prior``. "
+        more="It is ``geometric`` too with `effects`, `zones`, `monte_carlo`, a `redundancy` other than ``prior``, and "
+        "where readings are lengths or of fixtures. "
         "``auto`` chooses nothing: what the training part does not support shrinks to nothing.",
     )
     loss: Loss = option(
@@ -192,6 +193,7 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
             "zones are asked for": self.zones is not None,
             "calibrations are simulated": self.monte_carlo is not None,
             f"redundancy is {self.redundancy}": self.redundancy != "prior",
+            "readings are lengths or of fixtures": training.fixture is not None or not training.has_position.any(),
         }
         for reason, is_so in because.items():
             if is_so:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
@@ -352,7 +352,7 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
         at_bound=tuple(n for n, bound in zip(free.names, at_bound, strict=True) if bound),
         unobservable=unobservable,
         gauge_freedoms=gauge,
-        unobservable_combinations=_unobservable_combinations(problem, x) if gauge else (),
+        unobservable_combinations=_unobservable_combinations(problem, x, weighed) if gauge else (),
         sigma={name: _sigma_of(name, problem, components, name in declared) for name in noise},
         declared=declared == set(noise),
         excess=excess,
@@ -499,11 +499,15 @@ def _left_open(problem: Problem, vector: Array, limits: tuple[Array, Array] | No
     return parameters
 
 
-def _unobservable_combinations(problem: Problem, vector: Array) -> tuple[str, ...]:
-    """Return the combinations of the robot's own parameters that the readings do not observe."""
-    if SCALE in problem.free.names:
-        vector = np.delete(vector, problem.free.names.index(SCALE))
-        problem = replace(problem, free=problem.free.without([SCALE]))
+def _unobservable_combinations(problem: Problem, vector: Array, weighed: Collection[str]) -> tuple[str, ...]:
+    """Return the combinations of the robot's own parameters that the readings do not observe.
+
+    Args:
+        weighed: Parameters whose size the data tell; they stay as they are.
+    """
+    aside = {SCALE, *weighed}.intersection(problem.free.names)
+    vector = vector[[name not in aside for name in problem.free.names]]
+    problem = replace(problem, free=problem.free.without(sorted(aside)))
     beside = {p.name for p in problem.free.parameters if p.group in ("target", "fixture")}
     own = [
         {n: c for n, c in redundancy.members.items() if n not in beside}

@@ -71,6 +71,6 @@ def test_what_a_result_was_asked_for_gives_the_same_result_again() -> None:
 def test_lengths_are_too_few_numbers_for_every_effect() -> None:
     twin, data = campaign("ur5", 40, 1e-5, 1)
     lengths = replace(data, position=np.full_like(data.position, np.nan))
-    for readings in (lengths, replace(data, fixture=np.zeros(len(data.target), dtype=np.int64))):
+    for readings in (lengths, replace(data, fixture=np.zeros(len(data.target), dtype=np.int64), fixtures=("plate",))):
         model, because = Calibrate("ur5", data).model_for(twin.robot, readings)
         assert (model, because) == ("geometric", "readings are lengths or of fixtures")

@@ -196,9 +196,9 @@ class Calibration(Record):
         if self.excluded:
             yield excluded_block(self.excluded)
         yield detail("" if self.advice or not sound else status, status=self.status.value)
+        yield from expected_blocks(self.expected)
         for leaf in leaves_of(self._further()):
             yield replace(leaf, in_json={})
-        yield from expected_blocks(self.expected)
         if unseen is not None:
             yield least_block(unseen, self.least)
         if self.notes:

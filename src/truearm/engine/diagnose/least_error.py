@@ -36,6 +36,8 @@ _KINDS: Final[dict[Kind, tuple[str, ...]]] = {
     "length": ("distance", "height"),
 }
 
+#: Share of declared noise from which what the fit says besides is told.
+_BEYOND_DECLARED: Final = 1.02
 #: What visits to fewer postures show need not hold elsewhere: farther out, errors of the joints do more.
 _FEWEST_POSTURES: Final = 5
 
@@ -75,7 +77,7 @@ def least_errors(
         again = _of_visits(errors, data, kind, declared)
         if again is not None:
             least[kind] = again
-        elif kind in by_fit and (declared is None or by_fit[kind] > (1.0 + 1e-9) * declared):
+        elif kind in by_fit and (declared is None or by_fit[kind] > _BEYOND_DECLARED * declared):
             least[kind] = LeastError(by_fit[kind], "residuals", declared)
         elif declared is not None:
             least[kind] = LeastError(declared, "declared", declared)

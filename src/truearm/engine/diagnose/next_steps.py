@@ -154,7 +154,7 @@ _NAMED_NEXT_STEPS: Final = 3
 _OWN_STEP: Final = frozenset(
     {
         *("instrument-moved", "target-moved", "joint-zero-jumped"),
-        *("narrow-data", "rank-loss", "not-converged", FEW_READINGS.code, WORSE.code),
+        *("narrow-data", "rank-loss", "priors-decide", "not-converged", FEW_READINGS.code, WORSE.code),
     }
 )
 #: Warnings whose cure comes before more configurations.
@@ -202,13 +202,13 @@ def steps_after_fit(case: Case, notices: Sequence[Notice]) -> tuple[NextStep, ..
         or any(step.gain is not None for step in bound)
         or any(step.code == "measure-again" for step in steps)
     )
-    if case.status is not Status.RANK_LOSS and not spoiled:
+    if not left.fit.unobservable and not spoiled:
         steps += _after(steps, _more(case, notices, remaining))
     steps += _cures(notices, steps)
     steps += bound
     if not case.held_out:
         steps.append(NextStep("hold-out", "Hold configurations out to judge the fit: leave `train=all` out."))
-    if case.status is Status.RANK_LOSS:
+    if left.fit.unobservable:
         more = NextStep("measure-more", _where_to_measure(case, f"determine {listed(left.fit.unobservable)}"))
         return (more, *most_useful_first(steps))[:MOST]
     if any(notice.code == FEW_READINGS.code for notice in notices):
@@ -352,7 +352,7 @@ def _where_to_measure(case: Case, purpose: str) -> str:
     few = joints_that_moved_little(case.left.fit, case.training)
     if few:
         region = f"in which these joints move further: {'; '.join(few[:_NAMED_NEXT_STEPS])}"
-    elif case.status is Status.RANK_LOSS or case.left.fit.gauge_freedoms:
+    elif case.left.fit.unobservable or case.left.fit.gauge_freedoms:
         region = "all over the workspace"
     else:
         region = f"also {least_known(case.left.fit)}"

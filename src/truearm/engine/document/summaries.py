@@ -21,16 +21,19 @@ from truearm.engine.robot.parts import Payload
 
 #: Effects that are named, the largest first.
 _LARGEST_SHARES: Final = 4
+#: What an effect moves the targets by from which it is shown [m].
+_SHOWN_SHARE: Final = 5e-6
 #: What deviations of a bootstrap follow from, after their number.
 BOOTSTRAPPED: Final = "fits to configurations drawn anew (bootstrap)"
 
 
 def shares_block(shares: Shares) -> Block:
     """Return what every effect does: by how much it moves the targets, in mm."""
-    moving = [share for share in shares.effects if share.taken]
+    moving = [share for share in shares.effects if (share.moves or 0.0) >= _SHOWN_SHARE]
     largest = ", ".join(f"{share.effect} {(share.moves or 0.0) * 1e3:.3f}" for share in moving[:_LARGEST_SHARES])
     more = len(moving) - _LARGEST_SHARES
-    text = f"Effects that move the targets [mm]: {largest or 'none'}{f', and {more} smaller' if more > 0 else ''}"
+    smaller = f", and {more} smaller" if more > 0 else ""
+    text = f"Effects that move the targets [mm]: {largest or f'none by {_SHOWN_SHARE * 1e3:g}'}{smaller}"
     figures = {
         "candidates": [
             {

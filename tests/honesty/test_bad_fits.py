@@ -196,15 +196,17 @@ def test_it_does_where_that_is_asked_for_and_then_anything_replaces_it(truearm: 
     sound, six, entry_errors = (
         written(tmp_path, data, f"{n}.csv") for n, data in enumerate((small_arm(), bad("six"), bad("accurate")))
     )
-    assert truearm("calibrate", "irb120", sound, "--out", out).code == 0
-    assert truearm("calibrate", "irb120", six, "--out", out, "--replace").code == 3
+    assert truearm("calibrate", "irb120", sound, "--model", "geometric", "--out", out).code == 0
+    assert truearm("calibrate", "irb120", six, "--model", "geometric", "--out", out, "--replace").code == 3
     content = json.loads((out / "result.json").read_text())
     assert (content["status"], "--replace" in content["command"]) == ("rank-loss", False)
-    assert truearm("calibrate", "irb120", entry_errors, "--out", out).code == 0  # a bad one replaces a bad one
-    assert truearm("calibrate", "irb120", six, "--out", out).code == 3
-    assert truearm("calibrate", "irb120", sound, "--out", out).code == 0  # and a sound one any
+    assert (
+        truearm("calibrate", "irb120", entry_errors, "--model", "geometric", "--out", out).code == 0
+    )  # a bad one replaces a bad one
+    assert truearm("calibrate", "irb120", six, "--model", "geometric", "--out", out).code == 3
+    assert truearm("calibrate", "irb120", sound, "--model", "geometric", "--out", out).code == 0  # and a sound one any
     assert truearm("calibrate", "irb120", sound, "--out", out, "--model", "elastic").code == 0
-    assert truearm("calibrate", "irb120", six, "--out", out).code == 2
+    assert truearm("calibrate", "irb120", six, "--model", "geometric", "--out", out).code == 2
 
 
 def test_the_robot_file_alone_says_that_a_result_is_sound(sound: Path, tmp_path: Path) -> None:

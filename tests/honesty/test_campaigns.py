@@ -361,7 +361,7 @@ LIES: Final[dict[str, Lie]] = {
 @cache
 def said(command: str, data: Change, folder: Path) -> Told:
     file = written(folder, data(honest()[1]))
-    out = () if command == "check" else ("--out", folder)
+    out = () if command == "check" else ("--model=geometric", "--out", folder)
     return told(command, "irb120", file, *out)
 
 

@@ -112,7 +112,8 @@ def with_sizes(
     count, first = len(sizes.groups), not len(sizes.deviation)
     if first:
         size = np.bincount(group, np.diag(moments)[:-1], count)
-        expected = np.sqrt(moments[-1, -1] / np.maximum(size, 1e-300) / count)
+        least = max(float(moments[-1, -1]) * (_SCALE / _MOST) ** 2 / count, 1e-300)  # what ends at the most
+        expected = np.sqrt(moments[-1, -1] / np.maximum(size, least) / count)
         sizes = replace(sizes, scale=np.clip(_SCALE * expected, _LEAST, _MOST))
     start = sizes.scale if first else np.maximum(sizes.deviation, _AGAIN * sizes.scale)  # nothing may come back
     declared = any(block.declared for block in problem.blocks)

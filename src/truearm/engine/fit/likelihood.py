@@ -221,6 +221,7 @@ class Linearised:
         if not self.priors or len(s) <= _FEW:
             return every, every[:, :0]
         seen = s**2 - 1.0 > _UNSEEN
+        seen[0] = True  # the best known one, where positions are so far off that they tell nothing
         return every[:, seen], every[:, ~seen]
 
     def parts(self) -> Iterable[tuple[Rows, Array]]:

@@ -126,13 +126,14 @@ def _row(entry: RobotEntry, calibration: Calibration, began: float) -> Row:
 def _own(calibration: Calibration) -> tuple[list[str], tuple[float, ...]]:
     """Return the parameters of the arm that were identified, and their covariance in priors, row by row."""
     fit = calibration.fit
+    mapping = fit.robot.parameters
     own = [
         (place, name)
         for place, name in enumerate(fit.free.names)
-        if (p := fit.robot.parameters[name]).group not in _OF_CAMPAIGN and p.deviation is not None
+        if (p := mapping[name]).group not in _OF_CAMPAIGN and p.deviation is not None
     ]
     places = [place for place, _ in own]
-    prior = fit.free.prior[places]
+    prior = np.array([mapping[name].prior for _, name in own])  # those of effects in the fit are as this robot's data
     covariance = fit.covariance[np.ix_(places, places)] / np.outer(prior, prior)
     rows = np.round(covariance, _DECIMALS)[np.tril_indices(len(places))] + 0.0
     return [name for _, name in own], tuple(rows.tolist())

@@ -72,6 +72,23 @@ class LeftOver:
         significant = s > 1e-8 * s[0]
         return cls(fit, problem, r, J, Q @ U[:, significant], s[significant], Vt[significant], data, chosen)
 
+    def told(self, *effects: str) -> LeftOver:
+        """Return what a model with every effect leaves to what the data tell, with what some of its effects explain.
+
+        Most of its parameters are known by their priors alone. They take nothing, but their directions would hide what
+        else is in the residuals. Any other model is as it is.
+        """
+        fit = self.fit
+        if not fit.model.weighed:
+            return self
+        left = self
+        if any(p.group in effects for p in fit.free.parameters):
+            free = FreeParameters(tuple(p for p in fit.free.parameters if p.group not in effects))
+            nothing = {p.name: p.nominal for p in fit.free.parameters if p.group in effects}
+            left = LeftOver.of(replace(fit, robot=fit.robot.with_values(nothing), free=free), self.asked)
+        told = left.strength > 1.0
+        return replace(left, basis=left.basis[:, told], strength=left.strength[told], turns=left.turns[told])
+
     def without(self, configurations: Sequence[int]) -> LeftOver:
         """Return what is left without some configurations; the parameters stay, and take what they can of the rest."""
         if not configurations:

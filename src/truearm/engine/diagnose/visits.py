@@ -226,9 +226,10 @@ def check_approach_lag(left_over: LeftOver) -> list[Notice]:
     shown = ", ".join(
         f"{from_si(lag, unit):+.3f} {unit}" for lag, unit in zip(approach.lags.tolist(), units, strict=True)
     )
+    of = "what the model would leave without approach" if left_over.fit.model.weighed else "the residuals"
     return [
         JOINTS_NOT_SETTLED(
-            f"The direction from which each joint arrived explains {approach.share:.0%} of the residuals. The true "
+            f"The direction from which each joint arrived explains {approach.share:.0%} of {of}. The true "
             f"joint positions differ from the recorded ones by {shown}, times the sign of the last move. Either the "
             "joints were read before the robot had settled: use the commanded joints, or read later. Or the joints "
             "have hysteresis: arrive from one side only."

@@ -99,10 +99,10 @@ def _check_narrow(case: Case) -> list[Notice]:
 
 def _check_payload(case: Case) -> list[Notice]:
     """Say if the payload cannot be the one that was carried; where the data are wrong, they say nothing of it."""
-    unlikely = check_payload(case.fit.start)
-    if unlikely or case.biased or has_error([*case.of_data, *case.of_robot, *case.changes]):
+    unlikely, wrong = check_payload(case.fit.start), has_error([*case.of_data, *case.of_robot, *case.changes])
+    if unlikely or wrong or case.biased or not case.fit.model.weighed:
         return unlikely
-    return check_payload_read(case.fit, case.training, case.data)
+    return check_payload_read(case.left_by_few)
 
 
 #: What is asked of every fit. What one tells may silence another, by :attr:`Rule.unless`.
@@ -113,7 +113,7 @@ CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
     lambda case: check_curves_of_loads(case.left),
     lambda case: check_far_from_nominal(case.fit),
     lambda case: case.changes,
-    lambda case: check_approach_lag(case.left),
+    lambda case: check_approach_lag(case.left_by_few),
     lambda case: check_residual(case.left),
     _check_narrow,
     lambda case: case.of_split,

@@ -10,12 +10,8 @@ from typing import Final
 import numpy as np
 
 from truearm.engine.base.errors import Notice, Rule
-from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.unmodelled import PAYLOAD, LeftOver, explanation
-from truearm.engine.fit.fit import Fit, identify
-from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.effects.compliance import Compliance
 from truearm.engine.robot.loads import joint_efforts
 from truearm.engine.robot.parameters import Parameter
 from truearm.engine.robot.postures import Postures
@@ -74,24 +70,18 @@ def check_payload(robot: Robot) -> list[Notice]:
     ]
 
 
-def check_payload_read(fit: Fit, training: Dataset, data: Dataset) -> list[Notice]:
-    """Return a notice if a fit of every effect makes up for another payload than the one given.
-
-    With every effect in the model little is left that could tell. So the readings are fitted anew with joints that give
-    way alone, and what that leaves is asked.
+def check_payload_read(left: LeftOver) -> list[Notice]:
+    """Return a notice if another payload than the one given explains what a fit leaves whose joints give way at most.
 
     Args:
-        training: The readings it was made from.
-        data: All readings.
+        left: Of a fit of every effect, see :attr:`truearm.engine.diagnose.case.Case.left_by_few`.
     """
-    if not fit.model.weighed or Compliance.name not in fit.model.effects:
-        return []
-    bare = identify(fit.start, training, named_model("elastic"), loss=fit.loss, fixed=fit.fixed)
-    found = explanation(LeftOver.of(bare, data))
+    found = explanation(left)
     if found is None or found.cause != PAYLOAD:
         return []
     mass = f"{found.mass:.2g} kg" if found.mass else "another load"
-    stated = f"{fit.start.payload.mass:g} kg" if fit.start.payload.mass else "none"
+    payload = left.fit.robot.payload
+    stated = f"{payload.mass:g} kg" if payload.mass else "none"
     return [
         PAYLOAD_UNLIKELY(
             f"The readings look like {mass} on the flange instead of {stated}: that explains "

@@ -224,10 +224,10 @@ def check_approach_lag(left_over: LeftOver) -> list[Notice]:
     )
     return [
         JOINTS_NOT_SETTLED(
-            f"The direction from which each joint arrived explains {approach.share:.0%} of the residuals. The true "
-            f"joint positions differ from the recorded ones by {shown}, times the sign of the last move. Either the "
-            "joints were read before the robot had settled: use the commanded joints, or read later. Or the joints "
-            "have hysteresis: arrive from one side only."
+            f"The direction from which each joint arrived explains {approach.share:.0%} of what the "
+            f"{left_over.fit.model.name} model leaves. The true joint positions differ from the recorded ones by "
+            f"{shown}, times the sign of the last move. Either the joints were read before the robot had settled: use "
+            "the commanded joints, or read later. Or the joints have hysteresis: arrive from one side only."
         )
     ]
 

@@ -229,7 +229,8 @@ def _with_sizes_as_found(fit: Fit, training: Dataset) -> Fit:
     for rows, part in evaluation.portions():
         J = whitening.of(rows).applied(part.jacobian * fit.free.prior)
         information += J.T @ J
-    alone = CovariancePart(np.linalg.inv(information), math.inf).scaled(fit.free.prior)
+    covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    alone = CovariancePart(covariance, math.inf).scaled(fit.free.prior)
     return replace(fit, covariance_parts=(alone,), unfitted=())
 
 

@@ -206,8 +206,8 @@ class Calibration(Record):
         yield from expected_blocks(self.expected)
         if unseen is not None and self._by_order > _BY_ORDER * self.expected.overall.mean:
             yield say(
-                "  this one programs see: the held-out error knows the order of measurement, which moves the targets by "
-                f"{self._by_order * 1e3:.3f} mm"
+                "  this one programs see: the held-out error knows the order of measurement, which moves the targets "
+                f"by {self._by_order * 1e3:.3f} mm"
             )
         for leaf in leaves_of(self._further()):
             yield replace(leaf, in_json={})

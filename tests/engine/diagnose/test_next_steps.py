@@ -168,6 +168,21 @@ def test_where_every_effect_is_in_the_model_another_payload_is_told_too() -> Non
         assert bool(messages) is any("payload-unlikely" in step.message for step in run.next)
 
 
+def test_the_gain_of_every_effect_is_what_the_model_with_every_effect_gains() -> None:
+    robot, rng = load_robot("irb120").with_payload(LOAD), np.random.default_rng(3)
+    joints = {
+        i: JointTruth(compliance=5.0 * c, bearing=2e-5, gear=((2, 2e-4, 0.3),), hysteresis=2e-4)
+        for i, c in enumerate(SPRINGS, 1)
+    }
+    true = replace(truth_twin(robot, "random", rng), joints=joints)
+    data = measure(true, robot.random_configurations(70, rng), NOISE, rng)
+    runs = {model: calibrate(robot, data, model=model) for model in ("elastic", "auto")}
+    elastic_error, error = (known(known(run.validation).position).mean for run in runs.values())
+    (step,) = (step for step in runs["elastic"].next if step.code == "other-model")
+    assert step.gain == pytest.approx(elastic_error - error, rel=0.15)
+    assert "% of what is left, all together 8" in step.message
+
+
 def test_payloads_that_no_arm_carries_are_doubted() -> None:
     irb120, katana = load_robot("irb120"), load_robot("katana450")
     assert irb120.rated_load == 3.0

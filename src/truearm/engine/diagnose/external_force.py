@@ -84,10 +84,9 @@ def check_payload_read(left: LeftOver) -> list[Notice]:
     stated = f"{payload.mass:g} kg" if payload.mass else "none"
     return [
         PAYLOAD_UNLIKELY(
-            f"The readings look like {mass} on the flange instead of {stated}: that explains "
-            f"{1.0 - found.left:.0%} of what joints that give way under {stated} leave. Other effects make up for it "
-            "here, and predictions with another payload will be wrong. Check what the robot carried (`payload`) and "
-            "the masses in the robot file."
+            f"The readings look like {mass} on the flange instead of {stated}: with that, joints that give way leave "
+            f"{1.0 - found.left:.0%} less. Other effects make up for it here, and predictions with another payload "
+            "will be wrong. Check what the robot carried (`payload`) and the masses in the robot file."
         )
     ]
 

@@ -186,6 +186,9 @@ class Explanation:
     left: float
     chance: float  #: Probability that noise alone shows as much with any of the causes tried.
     mass: float = 0.0  #: Of the payload [kg]; zero for other causes, and where it cannot be told.
+    #: Root mean square likewise with all joint effects that were tried, not with the cause alone; None where that says
+    #: no more.
+    together: float | None = None
 
 
 def with_causes(left: LeftOver, *causes: str) -> LeftOver:
@@ -256,7 +259,12 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
         return None
     best = min(judged, key=lambda e: e.left)
     likely = [(e, share) for cause, share in _AS_GOOD.items() for e in judged if e.cause == cause]
-    return next((e for e, share in likely if 1.0 - e.left >= share * (1.0 - best.left)), best)
+    found = next((e for e, share in likely if 1.0 - e.left >= share * (1.0 - best.left)), best)
+    effects = [columns for cause, columns, _ in causes if cause not in (GEOMETRY, LOADS, PAYLOAD)]
+    if found.cause in (GEOMETRY, LOADS, PAYLOAD) or len(effects) < 2:
+        return found
+    every = _judged(residual, found.cause, np.concatenate(effects, axis=1), 0.0, freedom, len(causes))
+    return found if every is None or every.left >= found.left else replace(found, together=every.left)
 
 
 def can_explain(left: LeftOver) -> bool:

@@ -283,6 +283,7 @@ def test_joints_read_before_settling_show(measured_data: Path) -> None:
     assert mean <= 0.50
     assert "before the robot had settled" in notices["joints-not-settled"]
     assert "hysteresis" in notices["joints-not-settled"]
+    assert "wrong-robot" not in notices
 
 
 def test_hysteresis_of_a_simulated_robot_shows() -> None:

@@ -444,6 +444,9 @@ def test_what_is_left_out_is_named_and_what_does_nothing_is_not_missed() -> None
     tooled = replace(load_robot("li3"), tools={"pin": Tool({"1": (0.0, 0.0, 0.1)})}, truths={})
     assert says(tooled, "json", "Left out, because it is for simulation alone: tools.")
     assert exported(load_robot("ur5").with_effects(["approach", "thermal-growth"]), "python").left_out == ()
+    for turned, missed in ((1e-9, False), (1e-5, True)):
+        approaching = load_robot("ur5").with_effects(["approach"]).with_values({"approach_6": turned})
+        assert says(approaching, "urdf", "cannot hold the joint effect approach; left out: approach_6.") is missed
     robot = calibrated(load_robot("irb120"), (*FULL, "approach"))
     check_poses(module(robot)["forward"](q := configurations(robot)), robot, q)  # at rest, coming from nowhere known
 

@@ -33,7 +33,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
 from truearm.engine.diagnose.curves import FittedCurve, fitted_curves
 from truearm.engine.diagnose.error_budget import ErrorBudget, error_budget
-from truearm.engine.diagnose.expected_error import ExpectedError, expected_error, moved_by_order
+from truearm.engine.diagnose.expected_error import ExpectedError, error_by_order, expected_error, moved_by_order
 from truearm.engine.diagnose.gain import NO_GAIN, Repeatability, repeatability
 from truearm.engine.diagnose.least_error import Kind, LeastError, least_errors
 from truearm.engine.diagnose.next_step import NextStep
@@ -61,6 +61,8 @@ from truearm.engine.robot.robot_file.writing import robot_text
 
 #: What a calibration writes into its folder.
 RESULT_FILES: Final = ("calibrated.yaml", "result.json", "report.html", "calibrated.urdf")
+#: Share of the expected error from which what the order of measurement does is said beside it.
+_BY_ORDER: Final = 0.2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,6 +141,11 @@ class Calibration(Record):
         return error_budget(self.fit, self.data, training, held_out, self.expected)
 
     @cached_property
+    def _by_order(self) -> float:
+        """How far the held-out predictions lie from those that do not know the order of measurement [m]."""
+        return error_by_order(self.fit.robot, self.data.of_configurations(self.held_out))
+
+    @cached_property
     def curves(self) -> tuple[FittedCurve, ...]:
         """The curves of the joints, where the model has some; see the effect ``joint-curve``."""
         return fitted_curves(self.fit, self.data.of_configurations(self.training))
@@ -197,6 +204,11 @@ class Calibration(Record):
             yield excluded_block(self.excluded)
         yield detail("" if self.advice or not sound else status, status=self.status.value)
         yield from expected_blocks(self.expected)
+        if unseen is not None and self._by_order > _BY_ORDER * self.expected.overall.mean:
+            yield say(
+                "  this one programs see: the held-out error knows the order of measurement, which moves the targets "
+                f"by {self._by_order * 1e3:.3f} mm"
+            )
         for leaf in leaves_of(self._further()):
             yield replace(leaf, in_json={})
         if unseen is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from truearm.engine.data.statistics import table_motion, without_table_motion
 from truearm.engine.diagnose.error_budget import ErrorBudget, Source, error_budget
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.document.document import json_of, lines_of
+from truearm.engine.fit.every_effect import identify_every_effect
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import MODELS
 from truearm.engine.robot.chain import Array
@@ -44,8 +46,9 @@ def judged(
     repeat: float = 0.0,
     visits: int = 1,
     declared: float | None = 1.0,
+    every: bool = False,
 ) -> tuple[ErrorBudget, Fit, Twin, Dataset]:
-    """Return the budget of a geometric calibration of a twin, and the held-out readings."""
+    """Return the budget of a calibration of a twin, geometric or with every effect, and the held-out readings."""
     rng = np.random.default_rng(seed)
     twin = truth_twin(ROBOT, truth, rng)
     joints = np.repeat(ROBOT.random_configurations(poses + HELD_OUT, rng), visits, axis=0)
@@ -53,7 +56,7 @@ def judged(
     if data.sigma is not None:
         data = replace(data, sigma=None if declared is None else declared * data.sigma)
     first, remaining = (data.of_configurations(part) for part in np.split(np.arange(len(joints)), [poses * visits]))
-    fit = identify(ROBOT, first, MODEL["geometric"])
+    fit = identify_every_effect(ROBOT, first)[1] if every else identify(ROBOT, first, MODEL["geometric"])
     return known(error_budget(fit, data, first, remaining)), fit, twin, remaining
 
 
@@ -123,6 +126,17 @@ def test_what_the_model_lacks_is_found() -> None:
         assert square(budget, "model") > 0.6 * true
         assert "how well the robot comes back" in budget.share("model").words
         assert square(budget, "instrument") == pytest.approx(3 * 0.02e-3**2, rel=0.3)
+
+
+@pytest.mark.parametrize("truth", ["gear-errors", "random"])
+def test_where_every_effect_is_in_the_model_nothing_is_counted_twice(truth: str) -> None:
+    """What is expected of effects that may be larger than they were found is no share of what is seen."""
+    budget, fit, twin, others = judged(truth, 40, 0.03e-3, 5, every=True)
+    assert math.fsum(share.square or 0.0 for share in budget.shares) == pytest.approx(budget.square, rel=1e-9)
+    assert all((share.square or 0.0) >= 0.0 for share in budget.shares if share.source != "remainder")
+    assert abs(square(budget, "remainder")) < 0.15 * budget.square
+    explained = square(budget, "model") + square(budget, "parameters")
+    assert explained == pytest.approx(of_the_model(fit, twin, others), abs=0.2 * budget.square)
 
 
 def test_repeatability_is_told_from_the_model_where_postures_were_visited_again() -> None:

@@ -20,6 +20,7 @@ from truearm.checking.checking import DataCheck
 from truearm.engine.base.errors import Notice
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.diagnose.curves import about_curves
+from truearm.engine.diagnose.external_force import check_payload
 from truearm.engine.diagnose.next_step import MOST, NextStep, most_useful_first
 from truearm.engine.diagnose.next_steps import _after, _end, steps_after_check
 from truearm.engine.diagnose.off_configurations import off_configurations
@@ -155,6 +156,47 @@ def test_a_forgotten_payload_is_named_with_its_mass_and_missing_masses_are_asked
     assert step.code == "give-loads"
     assert "masses" in step.message
     assert "`payload`" in step.message
+
+
+def test_where_every_effect_is_in_the_model_another_payload_is_told_too() -> None:
+    """Other effects take what the payload does; at the load that was given the arm is off."""
+    for payload, said in ((LOAD, ""), (Payload(0.3), "instead of 0.3 kg")):
+        run = calibrate("irb120", elastic(), model="auto", payload=payload)
+        messages = [n.message for n in run.warnings if n.code == "payload-unlikely"]
+        assert len(messages) == bool(said), (payload, messages)
+        assert all(said in message and "Other effects make up for it" in message for message in messages)
+        assert bool(messages) is any("payload-unlikely" in step.message for step in run.next)
+
+
+def test_the_gain_of_every_effect_is_what_the_model_with_every_effect_gains() -> None:
+    robot, rng = load_robot("irb120").with_payload(LOAD), np.random.default_rng(3)
+    joints = {
+        i: JointTruth(compliance=5.0 * c, bearing=2e-5, gear=((2, 2e-4, 0.3),), hysteresis=2e-4)
+        for i, c in enumerate(SPRINGS, 1)
+    }
+    true = replace(truth_twin(robot, "random", rng), joints=joints)
+    data = measure(true, robot.random_configurations(70, rng), NOISE, rng)
+    runs = {model: calibrate(robot, data, model=model) for model in ("elastic", "auto")}
+    elastic_error, error = (known(known(run.validation).position).mean for run in runs.values())
+    (step,) = (step for step in runs["elastic"].next if step.code == "other-model")
+    assert step.gain == pytest.approx(elastic_error - error, rel=0.15)
+    assert "% of what is left, all together 8" in step.message
+
+
+def test_payloads_that_no_arm_carries_are_doubted() -> None:
+    irb120, katana = load_robot("irb120"), load_robot("katana450")
+    assert irb120.rated_load == 3.0
+    assert katana.rated_load is None
+    for robot, payload, words in (
+        (irb120, Payload(27.0), "is rated for 3 kg. Were grams called kilograms?"),
+        (irb120, Payload(2.7, (0.0, 0.0, 100.0)), "lies 100 m from the flange"),
+        (katana, Payload(500.0), "no arm of that size carries more"),
+    ):
+        (notice,) = check_payload(robot.with_payload(payload))
+        assert (notice.code, notice.level) == ("payload-unlikely", "warning")
+        assert words in notice.message
+    for robot, payload in ((irb120, Payload(3.3, (0.1, 0.0, 0.3))), (katana, Payload(0.5, (0.0, 0.0, 0.1)))):
+        assert check_payload(robot.with_payload(payload)) == []
 
 
 @pytest.mark.parametrize("of_one", [False, True])
@@ -303,7 +345,7 @@ def test_few_configurations_cannot_tell_errors_of_gears() -> None:
         assert step.code == "unexplained", effects
         assert "no effect known here explains" not in step.message
         assert "cannot be told from 18 training configurations: measure about 200" in step.message
-    (step,) = calibrate("irb120", data, model="auto").next  # other effects stand in for them, and are uncertain
+    (step,) = calibrate("irb120", elastic(), model="auto").next  # other effects stand in for them, and are uncertain
     assert step.code == "measure-more"
 
 

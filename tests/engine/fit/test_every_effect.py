@@ -177,6 +177,18 @@ def test_the_direction_of_approach_is_found_where_it_matters() -> None:
     assert [notice.code for notice in check_shares(shares)] == ["order-in-the-model"]
 
 
+def test_which_error_programs_see_is_said_where_the_order_of_measurement_makes_a_difference() -> None:
+    late, steady = (
+        calibrate(arm(), seen(arm(), 40, 3, hysteresis=math.radians(size)), model="auto") for size in (0.02, 0.0)
+    )
+    (line,) = [line for line in late.lines() if "programs see" in line]
+    unseen = late.data.of_configurations(late.held_out)
+    apart = errors_of(late.fit.robot, unordered(unseen)).position_errors - known(late.validation).position_errors
+    size = 1e3 * math.sqrt(float(np.mean(np.sum(apart**2, axis=1))))
+    assert float(line.split(" by ")[1].split(" mm")[0]) == pytest.approx(size, rel=0.02)
+    assert not any("programs see" in line for line in steady.lines())
+
+
 def test_what_is_not_there_shrinks() -> None:
     _, fit, shares = plain()
     assert fit.status is Status.CONVERGED

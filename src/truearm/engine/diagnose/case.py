@@ -31,7 +31,9 @@ from truearm.engine.diagnose.wrong_robot import (
     check_robot,
     judges_lengths,
 )
-from truearm.engine.fit.fit import Fit, Status
+from truearm.engine.fit.fit import Fit, Status, identify
+from truearm.engine.fit.models import named_model
+from truearm.engine.robot.effects.compliance import Compliance
 
 #: Readings that pull a fit, and single ones that are far off: what is left is not the robot's.
 _DOUBTING: Final = PULLING | {OUTLIERS.code}
@@ -61,6 +63,19 @@ class Case:
         return LeftOver.of(self.fit, self.data)
 
     @cached_property
+    def left_by_few(self) -> LeftOver:
+        """What the fit leaves; where every effect is in it, what one leaves whose joints give way at most.
+
+        Every effect together takes up much of what is wrong with data, too.
+        """
+        fit = self.fit
+        if not fit.model.weighed:
+            return self.left
+        model = named_model("elastic" if Compliance.name in fit.model.effects else "geometric")
+        few = identify(fit.start, self.training, model, loss=fit.loss, fixed=fit.fixed)
+        return LeftOver.of(few, self.data)
+
+    @cached_property
     def off(self) -> Off:
         """The configurations that are off one by one."""
         return off_configurations(self.left)
@@ -68,7 +83,7 @@ class Case:
     @cached_property
     def moved(self) -> tuple[LeftOver, Change] | None:
         """What moved during the campaign."""
-        return what_moved(self.left, self.off)
+        return what_moved(self.left_by_few, self.off)
 
     @cached_property
     def changes(self) -> list[Notice]:

@@ -216,7 +216,7 @@ def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
 
     A single configuration that is far off looks like something that moved. Nothing is returned where nothing moved.
     """
-    remaining = left.told().without(() if is_a_part(off) else off.indices)
+    remaining = left.without(() if is_a_part(off) else off.indices)
     change = find_change(remaining)
     return None if change is None else (remaining, change)
 

@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from truearm.engine.base.errors import Notice, Rule, counted, worst_first
+from truearm.engine.base.errors import Notice, Rule, counted, has_error, worst_first
 from truearm.engine.data.thinning import JUDGED_IN_PART
 from truearm.engine.diagnose.advice import check_far_from_nominal, check_fit
 from truearm.engine.diagnose.case import Case
 from truearm.engine.diagnose.changes import OF_CHANGES
 from truearm.engine.diagnose.curves import check_curves, check_curves_of_loads, check_one_sided
 from truearm.engine.diagnose.expected_error import ExpectedError
-from truearm.engine.diagnose.external_force import check_payload
+from truearm.engine.diagnose.external_force import check_payload, check_payload_read
 from truearm.engine.diagnose.narrow_data import (
     check_narrow_data,
     check_narrow_data_without_geometry,
@@ -97,6 +97,14 @@ def _check_narrow(case: Case) -> list[Notice]:
     return narrow or check_narrow_data(fit, case.expected, case.training, case.errors, held_out=case.held_out)
 
 
+def _check_payload(case: Case) -> list[Notice]:
+    """Say if the payload cannot be the one that was carried; where the data are wrong, they say nothing of it."""
+    unlikely, wrong = check_payload(case.fit.start), has_error([*case.of_data, *case.of_robot, *case.changes])
+    if unlikely or wrong or case.biased or not case.fit.model.weighed:
+        return unlikely
+    return check_payload_read(case.left_by_few)
+
+
 #: What is asked of every fit. What one tells may silence another, by :attr:`Rule.unless`.
 CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
     lambda case: case.of_data,
@@ -105,11 +113,11 @@ CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
     lambda case: check_curves_of_loads(case.left),
     lambda case: check_far_from_nominal(case.fit),
     lambda case: case.changes,
-    lambda case: check_approach_lag(case.left),
+    lambda case: check_approach_lag(case.left_by_few),
     lambda case: check_residual(case.left),
     _check_narrow,
     lambda case: case.of_split,
-    lambda case: check_payload(case.fit.start),
+    lambda case: _check_payload(case),
     lambda case: case.few,
     lambda case: check_fit(case.fit, case.expected),
     lambda case: check_one_sided(case.fit, case.training),

@@ -9,6 +9,9 @@ model cannot express is estimated from the training part alone: least squares le
 of the readings (Seber and Lee 2003, section 3.3; with priors, where these hold), so the residuals' mean square and what
 the parameters have taken of it add up to V, less what the instrument, the table and the return of the robot make. So
 all shares are known without the held-out errors, and what these are larger or smaller by is a remainder of its own.
+
+That holds for the covariance with the priors that the estimate was made with. Where the data tell how large effects
+are, the covariance of the fit is wider, for they may be larger than was found; so C is then made anew.
 """
 
 from __future__ import annotations
@@ -26,7 +29,9 @@ from truearm.engine.data.statistics import TableMotion, table_motion
 from truearm.engine.diagnose.expected_error import ExpectedError, PositionErrors, covariance_root, uncertain_names
 from truearm.engine.diagnose.gain import repeatability
 from truearm.engine.fit.fit import Fit
+from truearm.engine.fit.likelihood import Visits, Whitening
 from truearm.engine.fit.problem import Problem
+from truearm.engine.fit.variance_components import CovariancePart
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parameters import FreeParameters
 
@@ -147,6 +152,9 @@ def error_budget(
         expected: The error to expect over the workspace.
     """
     kind: Literal["position", "length"] = "position" if Position().present(training).any() else "length"
+    over_workspace = None if expected is None else _over_workspace(fit, expected)
+    if fit.model.weighed and fit.loss == "linear":
+        fit = _with_sizes_as_found(fit, training)
     seen = _part(fit, training, kind)
     judged = seen if held_out is None else _part(fit, held_out, kind)
     if seen is None or judged is None:
@@ -206,9 +214,24 @@ def error_budget(
         judged.readings,
         len(np.unique(judged.configuration)),
         tuple(shares),
-        None if expected is None else _over_workspace(fit, expected),
+        over_workspace,
         None if table is None else table.removed,
     )
+
+
+def _with_sizes_as_found(fit: Fit, training: Dataset) -> Fit:
+    """Return a fit whose covariance takes every effect for as large as it was found to be."""
+    noise = {observation.name: fit.sigma.get(observation.name, 1.0) for observation in OBSERVATIONS}
+    problem = Problem(fit.robot, training, fit.free, noise, widened=fit.excess)
+    evaluation = problem.at(np.array([fit.robot.values[name] for name in fit.free.names]))
+    whitening = Whitening(Visits(problem.visits), evaluation.by_joints * fit.joint_error)
+    information = np.eye(len(fit.free.names))
+    for rows, part in evaluation.portions():
+        J = whitening.of(rows).applied(part.jacobian * fit.free.prior)
+        information += J.T @ J
+    covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    alone = CovariancePart(covariance, math.inf).scaled(fit.free.prior)
+    return replace(fit, covariance_parts=(alone,), unfitted=())
 
 
 def _part(fit: Fit, data: Dataset, kind: str) -> _Part | None:

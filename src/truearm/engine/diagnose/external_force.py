@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -9,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from truearm.engine.base.errors import Notice, Rule
+from truearm.engine.diagnose.unmodelled import PAYLOAD, LeftOver, explanation
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.loads import joint_efforts
 from truearm.engine.robot.parameters import Parameter
@@ -20,6 +22,8 @@ from truearm.engine.robot.wrench import STANDARD_GRAVITY
 #: Payload over the cube of the reach that no arm carries [kg/m^3]. Strong ones carry 45 (2300 kg at 3.7 m), the IRB 120
 #: 15 (3 kg at 0.58 m).
 _MOST: Final = 450.0
+#: Rated loads that no arm is made to carry.
+_OVERLOAD: Final = 2.0
 #: Configurations at which the reach is looked for.
 _PLACES: Final = 200
 
@@ -27,25 +31,62 @@ _PLACES: Final = 200
 PAYLOAD_UNLIKELY: Final = Rule(
     "payload-unlikely",
     "warning",
-    "the payload is ten times beyond what the strongest arms of this reach carry (450 kg times the cube of the reach "
-    "in metres): grams called kilograms?",
+    "the payload is more than twice the rated load, or, where that is not known, ten times what the strongest arms of "
+    "this reach carry (450 kg times the cube of the reach in metres): grams called kilograms? Or its centre of gravity "
+    "is farther from the flange than the arm reaches, or another payload explains the readings of a fit of `auto`",
     gravity=2,
 )
 
 
 def check_payload(robot: Robot) -> list[Notice]:
-    """Return a notice if the payload is ten times beyond what the strongest arms of this reach carry."""
+    """Return a notice if the payload is too heavy for an arm like this, or lies beyond its reach."""
     mass = robot.payload.mass
     if mass <= 0.0:
         return []
     joints = robot.random_configurations(_PLACES, np.random.default_rng(0))
     reach = float(np.linalg.norm(robot.with_frames(Transform(), {}).world_poses(joints)[0], axis=1).max())
-    if mass <= _MOST * reach**3:
+    away = math.hypot(*robot.payload.cog)
+    if away > reach:
+        return [
+            PAYLOAD_UNLIKELY(
+                f"The centre of gravity of the payload lies {away:.3g} m from the flange, and {robot.name} reaches "
+                f"{reach:.2g} m. Were millimetres called metres? What loads the joints follows from it."
+            )
+        ]
+    rated = robot.rated_load
+    most = _MOST * reach**3 if rated is None else _OVERLOAD * rated
+    if mass <= most:
         return []
+    beside = (
+        f"{robot.name} reaches {reach:.2g} m: no arm of that size carries more than {most:.2g} kg"
+        if rated is None
+        else f"{robot.name} is rated for {rated:g} kg"
+    )
     return [
         PAYLOAD_UNLIKELY(
-            f"The payload is {mass:.4g} kg, and {robot.name} reaches {reach:.2g} m: no arm of that size carries more "
-            f"than {_MOST * reach**3:.2g} kg. Were grams called kilograms? What loads the joints follows from it."
+            f"The payload is {mass:.4g} kg, and {beside}. Were grams called kilograms? What loads the joints follows "
+            "from it."
+        )
+    ]
+
+
+def check_payload_read(left: LeftOver) -> list[Notice]:
+    """Return a notice if another payload than the one given explains what a fit leaves whose joints give way at most.
+
+    Args:
+        left: Of a fit of every effect, see :attr:`truearm.engine.diagnose.case.Case.left_by_few`.
+    """
+    found = explanation(left)
+    if found is None or found.cause != PAYLOAD:
+        return []
+    mass = f"{found.mass:.2g} kg" if found.mass else "another load"
+    payload = left.fit.robot.payload
+    stated = f"{payload.mass:g} kg" if payload.mass else "none"
+    return [
+        PAYLOAD_UNLIKELY(
+            f"The readings look like {mass} on the flange instead of {stated}: with that, joints that give way leave "
+            f"{1.0 - found.left:.0%} less. Other effects make up for it here, and predictions with another payload "
+            "will be wrong. Check what the robot carried (`payload`) and the masses in the robot file."
         )
     ]
 

@@ -128,7 +128,11 @@ def other_model(fit: Fit, candidate: Explanation, known: float) -> NextStep:
     if candidate.cause == GEOMETRY:
         words = f"Use `model=geometric`: free geometry and joint zeros explain {share} of what is left."
         return NextStep("other-model", words, gain)
-    words = f"Use `model=auto`, which has every joint effect: {candidate.cause} explains {share} of what is left."
+    words = f"Use `model=auto`, which has every joint effect: {candidate.cause} explains {share} of what is left"
+    if candidate.together is not None:
+        gain, share = known * (1.0 - candidate.together), f"{1.0 - candidate.together:.0%}"
+        words += f", all together {share}"
+    words += "."
     return NextStep("other-model", words, gain)
 
 

@@ -72,23 +72,6 @@ class LeftOver:
         significant = s > 1e-8 * s[0]
         return cls(fit, problem, r, J, Q @ U[:, significant], s[significant], Vt[significant], data, chosen)
 
-    def told(self, *effects: str) -> LeftOver:
-        """Return what a model with every effect leaves to what the data tell, with what some of its effects explain.
-
-        Most of its parameters are known by their priors alone. They take nothing, but their directions would hide what
-        else is in the residuals. Any other model is as it is.
-        """
-        fit = self.fit
-        if not fit.model.weighed:
-            return self
-        left = self
-        if any(p.group in effects for p in fit.free.parameters):
-            free = FreeParameters(tuple(p for p in fit.free.parameters if p.group not in effects))
-            nothing = {p.name: p.nominal for p in fit.free.parameters if p.group in effects}
-            left = LeftOver.of(replace(fit, robot=fit.robot.with_values(nothing), free=free), self.asked)
-        told = left.strength > 1.0
-        return replace(left, basis=left.basis[:, told], strength=left.strength[told], turns=left.turns[told])
-
     def without(self, configurations: Sequence[int]) -> LeftOver:
         """Return what is left without some configurations; the parameters stay, and take what they can of the rest."""
         if not configurations:
@@ -203,6 +186,9 @@ class Explanation:
     left: float
     chance: float  #: Probability that noise alone shows as much with any of the causes tried.
     mass: float = 0.0  #: Of the payload [kg]; zero for other causes, and where it cannot be told.
+    #: Root mean square likewise with all joint effects that were tried, not with the cause alone; None where that says
+    #: no more.
+    together: float | None = None
 
 
 def with_causes(left: LeftOver, *causes: str) -> LeftOver:
@@ -273,7 +259,12 @@ def explanation(left: LeftOver, without: Sequence[int] = ()) -> Explanation | No
         return None
     best = min(judged, key=lambda e: e.left)
     likely = [(e, share) for cause, share in _AS_GOOD.items() for e in judged if e.cause == cause]
-    return next((e for e, share in likely if 1.0 - e.left >= share * (1.0 - best.left)), best)
+    found = next((e for e, share in likely if 1.0 - e.left >= share * (1.0 - best.left)), best)
+    effects = [columns for cause, columns, _ in causes if cause not in (GEOMETRY, LOADS, PAYLOAD)]
+    if found.cause in (GEOMETRY, LOADS, PAYLOAD) or len(effects) < 2:
+        return found
+    every = _judged(residual, found.cause, np.concatenate(effects, axis=1), 0.0, freedom, len(causes))
+    return found if every is None or every.left >= found.left else replace(found, together=every.left)
 
 
 def can_explain(left: LeftOver) -> bool:

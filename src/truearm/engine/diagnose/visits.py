@@ -17,7 +17,6 @@ from truearm.engine.fit.likelihood import Linearised, Visits
 from truearm.engine.fit.rounds import DECLARED, factors_of
 from truearm.engine.fit.variance_components import Variances, largest_likelihood
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.effects.approach import Approach
 
 # How likely the readings are if visits, their noise or the errors of the joints were others than the fit took.
 #
@@ -149,8 +148,6 @@ def _no_outliers(residual: Array, of_reading: NDArray[np.intp]) -> NDArray[np.bo
 #: Part of the residuals that the direction of approach must explain, and of the joints that must lag with one sign.
 _LEAST_EXPLAINED: Final = 0.05
 _LEAST_OF_ONE_SIGN: Final = 2 / 3
-#: Part of the largest lag from which a joint counts as late, metres beside radians.
-_LEAST_OF_LARGEST: Final = 0.1
 #: Noise alone must show a direction of approach that explains as much less often than this.
 _LARGEST_CHANCE: Final = 1e-3
 
@@ -169,8 +166,8 @@ class ApproachLag:
     @property
     def fires(self) -> bool:
         """Whether it explains at least 5 %, more than chance, with one sign on most joints."""
-        large = np.abs(self.lags) >= _LEAST_OF_LARGEST * np.abs(self.lags).max()
-        same = max(int((large & (self.lags > 0)).sum()), int((large & (self.lags < 0)).sum()))
+        positive = int((self.lags > 0).sum())
+        same = max(positive, len(self.lags) - positive)
         is_large = self.share >= _LEAST_EXPLAINED and self.chance < _LARGEST_CHANCE
         return is_large and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
@@ -180,11 +177,10 @@ def approach_lag(left_over: LeftOver) -> ApproachLag | None:
 
     None where too few readings are left, or where the order of measurement is not known.
     """
-    asked = left_over.asked
-    if left_over.problem.data.number is None or asked.number is None:
-        return None
-    left_over = left_over.told(Approach.name)
     data, problem = left_over.problem.data, left_over.problem
+    asked = left_over.asked
+    if data.number is None or asked.number is None:
+        return None
     evaluation = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
     H = evaluation.by_joints * _last_moves(asked, asked.number)[left_over.chosen][left_over.configuration]
     free = left_over.freedom
@@ -226,13 +222,12 @@ def check_approach_lag(left_over: LeftOver) -> list[Notice]:
     shown = ", ".join(
         f"{from_si(lag, unit):+.3f} {unit}" for lag, unit in zip(approach.lags.tolist(), units, strict=True)
     )
-    of = "what the model would leave without approach" if left_over.fit.model.weighed else "the residuals"
     return [
         JOINTS_NOT_SETTLED(
-            f"The direction from which each joint arrived explains {approach.share:.0%} of {of}. The true "
-            f"joint positions differ from the recorded ones by {shown}, times the sign of the last move. Either the "
-            "joints were read before the robot had settled: use the commanded joints, or read later. Or the joints "
-            "have hysteresis: arrive from one side only."
+            f"The direction from which each joint arrived explains {approach.share:.0%} of what the "
+            f"{left_over.fit.model.name} model leaves. The true joint positions differ from the recorded ones by "
+            f"{shown}, times the sign of the last move. Either the joints were read before the robot had settled: use "
+            "the commanded joints, or read later. Or the joints have hysteresis: arrive from one side only."
         )
     ]
 

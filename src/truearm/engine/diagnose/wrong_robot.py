@@ -23,6 +23,7 @@ from truearm.engine.data.statistics import errors_of
 from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
 from truearm.engine.fit.fit import Fit, place
 from truearm.engine.fit.frames import errors_of_placed
+from truearm.engine.fit.likelihood import Visits, Whitening
 from truearm.engine.fit.models import FRAMES
 from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array
@@ -212,8 +213,7 @@ class Lengths:
         """Find them for a fit and the readings it was made from.
 
         The fit is taken one linear step further, to where the priors of all but lengths are wider. Parameters that it
-        held for being redundant are free again, those at a bound stay. Errors of the joints that readings of a visit
-        share are taken for errors of single readings.
+        held for being redundant are free again, those at a bound stay. Readings of a visit share errors of the joints.
         """
         robot = fit.robot
         names = [n for n in (*fit.free.names, *(r.dropped for r in fit.redundancies)) if n not in fit.at_bound]
@@ -234,9 +234,13 @@ class Lengths:
         table = replace(robot, known={}).parameters
         centre = [table[p.name].nominal if p.group in _TABLE else p.value for p in free.parameters]
         triangle = np.column_stack([np.eye(len(names)), np.zeros(len(names))])
-        for rows, part in problem.at(free.start).portions():
+        evaluation = problem.at(free.start)
+        shared = evaluation.by_joints * (weight[:, None] * fit.joint_error)
+        whitening = Whitening(Visits(problem.visits), shared)
+        for rows, part in evaluation.portions():
             J = part.jacobian * (weight[rows, None] * prior)
             wanted = J @ ((free.start - centre) / prior) - part.residual * weight[rows]
+            J, wanted = (whitening.of(rows).applied(each) for each in (J, wanted))
             triangle = np.asarray(np.linalg.qr(np.block([[J, wanted[:, None]], [triangle]]), mode="r"))
         own = slice(len(names) - count, len(names))
         U, s, Vt = np.linalg.svd(triangle[own, own])

@@ -16,6 +16,7 @@ from truearm.engine.base.units import mark_lines, written
 from truearm.engine.robot.chain import Array, Element
 from truearm.engine.robot.controller import Controller, JointsOf
 from truearm.engine.robot.effects.balancing import Balancing
+from truearm.engine.robot.effects.effect import Effect
 from truearm.engine.robot.parts import NO_PAYLOAD, Joint
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
@@ -23,6 +24,11 @@ from truearm.engine.robot.urdf_tree import Triple, product, roll_pitch_yaw
 
 #: Two frames less than this apart [m, rad] are the same to any instrument.
 _SAME_FRAME: Final = 1e-9
+#: What an effect moves the tip by, a root mean square, from which it is said to be left out [m], as where effects are
+#: identified; a tip that far from the flange; and joint positions at which that is looked at.
+_MATTERS: Final = 1e-6
+_TIP: Final = 0.1
+_TRIED: Final = 50
 
 
 def left_out(robot: Robot, format_: str, supported: Collection[str] = ()) -> list[str]:
@@ -35,7 +41,7 @@ def left_out(robot: Robot, format_: str, supported: Collection[str] = ()) -> lis
     messages = []
     for effect in robot.effects:
         names = [plain.name for plain in effect.parameters if robot.values[plain.name] != plain.value]
-        if names and effect.name not in supported:
+        if names and effect.name not in supported and _matters(robot, effect):
             messages.append(f"{format_} cannot hold the joint effect {effect.name}; left out: {', '.join(names)}.")
     if robot.balancers and Balancing.name not in supported:
         names = [balancer.name for balancer in robot.balancers]
@@ -50,6 +56,18 @@ def left_out(robot: Robot, format_: str, supported: Collection[str] = ()) -> lis
         names = [target.name for target in robot.targets]
         messages.append(f"{format_} cannot hold the targets on the flange; left out: {', '.join(names)}.")
     return messages
+
+
+def _matters(robot: Robot, effect: Effect) -> bool:
+    """Return whether an effect moves the tip by more than next to nothing; what follows the temperature always does."""
+    if effect.warmed:
+        return True
+    at = robot.loaded(robot.random_configurations(_TRIED, np.random.default_rng(0)))
+    at = replace(at, approach=np.ones_like(at.joints), number=np.zeros(_TRIED))
+    without = robot.with_values({p.name: p.value for p in effect.parameters})
+    place, turn = (with_it - bare for with_it, bare in zip(robot.world_poses(at), without.world_poses(at), strict=True))
+    squares = np.sum(place**2, axis=1) + _TIP**2 * np.sum(turn**2, axis=(1, 2))
+    return bool(np.mean(squares) >= _MATTERS**2)
 
 
 def masses_left_out(robot: Robot, format_: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Curves of joints: their stiffness by restricted maximum likelihood, and what they do for twins whose gears err."""
+"""Curves of joints: what they do for twins whose gears err."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
@@ -18,10 +17,8 @@ from truearm.engine.diagnose.advice import check_fit
 from truearm.engine.diagnose.curves import check_curves
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.diagnose.narrow_data import check_narrow_data
-from truearm.engine.fit.curves import curve_variances, moments_without
 from truearm.engine.fit.fit import Fit, Status, identify
 from truearm.engine.fit.models import named_model
-from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.joint_curve import curve_names, curve_waves
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Payload
@@ -64,106 +61,6 @@ def test_curves_that_were_found_are_not_lost_where_noise_is_small() -> None:
     data = measure(twin, robot.random_configurations(200, rng), 5e-6, rng)
     fit = identify(robot, data.of_configurations(np.arange(140)), named_model("geometric").also(["joint-curve"]))
     assert mean_error(fit.robot, data.of_configurations(np.arange(140, 200))) < 2e-5  # it was 0.05 mm and more
-
-
-# -- stiffness
-
-Numbers = NDArray[np.intp]
-Synthetic = tuple[Array, Array, Array, Numbers, Numbers]
-
-
-def synthetic(rows: int, joints: int, variance: Array, rng: np.random.Generator, arc: float = 2 * math.pi) -> Synthetic:
-    """Return derivatives by 5 other parameters and by curves, right sides, and joint and period of each coefficient."""
-    highest = len(variance) // (2 * joints)
-    F = np.column_stack(
-        [rng.normal(size=(rows, 1)) * curve_waves(rng.uniform(0, arc, rows), highest).T for _ in range(joints)]
-    )
-    A = 3.0 * rng.normal(size=(rows, 5))
-    z = A @ rng.normal(size=5) + F @ (np.sqrt(variance) * rng.normal(size=len(variance))) + rng.normal(size=rows)
-    joint: Numbers = np.repeat(np.arange(joints, dtype=np.intp), 2 * highest)
-    period: Numbers = np.tile(np.repeat(np.arange(1, highest + 1, dtype=np.intp), 2), joints)
-    return A, F, z, joint, period
-
-
-def moments_of(A: Array, F: Array, z: Array) -> Array:
-    columns = np.column_stack([A, F, z])
-    return moments_without(columns.T @ columns, A.shape[1])
-
-
-def test_likelihood_is_that_of_the_dense_covariance() -> None:
-    rng = np.random.default_rng(3)
-    variance = np.repeat([9.0, 0.0, 4.0, 0.5], 4)
-    A, F, z, joint, period = synthetic(120, 2, variance, rng)
-    estimate = curve_variances(moments_of(A, F, z), len(z), joint, period)
-    assert set(estimate.gains) == {0, 1}
-
-    def dense(v: Array) -> float:
-        V = estimate.noise * (np.eye(len(z)) + A @ A.T) + (F * v) @ F.T
-        return -0.5 * float(np.linalg.slogdet(V)[1] + z @ np.linalg.solve(V, z))
-
-    free = estimate.full
-    for i, gain in estimate.gains.items():
-        assert gain == pytest.approx(dense(free) - dense(np.where(joint == i, 0.0, free)), abs=1e-6)
-
-
-def test_variances_are_those_that_were_drawn() -> None:
-    rng = np.random.default_rng(4)
-    truth = np.tile(np.repeat([4.0, 1.0, 0.25], 20), 2)
-    truth[60:] = 0.0  # the other joint has no curve
-    ratios = []
-    for _ in range(5):
-        estimate = curve_variances(*_inputs(synthetic(1500, 2, truth, rng)))
-        assert set(estimate.gains) == {0}
-        assert not estimate.variance[60:].any()
-        assert estimate.noise == pytest.approx(1.0, abs=0.15)
-        ratios.append(estimate.full[:60].reshape(3, 20).mean(axis=1) / [4.0, 1.0, 0.25])
-    assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.4)  # the rare ones are shrunk towards the rest
-
-
-def _inputs(result: Synthetic) -> tuple[Array, float, Numbers, Numbers]:
-    A, F, z, joint, period = result
-    return moments_of(A, F, z), float(len(z)), joint, period
-
-
-def test_noise_alone_has_no_curve() -> None:
-    rng = np.random.default_rng(5)
-    for rows in (60, 300, 1000):
-        estimate = curve_variances(*_inputs(synthetic(rows, 3, np.zeros(3 * 120), rng)))
-        assert not estimate.variance.any()
-        assert estimate.gains == {}
-        assert estimate.noise == pytest.approx(1.0, abs=0.4)
-
-
-def test_a_line_stands_out_and_what_is_beside_it_is_shrunk() -> None:
-    truth = np.zeros(120)
-    truth[2 * 16 : 2 * 17] = 4.0
-    estimate = curve_variances(*_inputs(synthetic(400, 1, truth, np.random.default_rng(6))))
-    assert estimate.full[32:34].mean() > 1.0
-    assert np.delete(estimate.full, [32, 33]).max() < 0.05
-    assert estimate.informed[32:34].min() > 0.9
-
-
-def test_units_and_the_order_of_the_joints_do_not_matter() -> None:
-    result = synthetic(300, 2, np.repeat([1.0, 0.2], 40), np.random.default_rng(7))
-    A, F, z, joint, period = result
-    plain = curve_variances(*_inputs(result))
-    swapped = np.r_[40:80, 0:40]
-    other = curve_variances(moments_of(A, 1e3 * F[:, swapped], z), len(z), 1 - joint[swapped], period)
-    assert_allclose(1e6 * other.variance, plain.variance[swapped], rtol=1e-4, atol=1e-12)
-
-
-def test_a_joint_that_readings_do_not_see_has_no_curve() -> None:
-    A, F, z, joint, period = synthetic(400, 2, np.repeat([1.0, 4.0], 40), np.random.default_rng(8))
-    every = curve_variances(*_inputs((A, F, z, joint, period)), most=1000.0)
-    assert set(every.gains) == {0, 1}
-    seen = curve_variances(*_inputs((A, F, z, joint, period)), most=80.0)  # the second has 160
-    assert set(seen.gains) == {0}
-    assert not seen.full[joint == 1].any()
-    small = np.where(joint == 1, 1e-4, 1.0)  # the noise seems to be a curve of 1e4 times the size
-    assert set(curve_variances(*_inputs((A, F * small, z, joint, period)), most=1000.0).gains) == {0}
-
-
-# -- twins
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.bounds import Bounds
-from truearm.engine.fit.curves import parts_with_curves
 from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.likelihood import Visits
 from truearm.engine.fit.losses import ABSOLUTE, Loss, pulls, scales_of_pulls
@@ -29,7 +27,7 @@ from truearm.engine.fit.problem import (
     in_words,
     unobservable_parameters,
 )
-from truearm.engine.fit.relevance import expected_sizes
+from truearm.engine.fit.relevance import parts_with_sizes
 from truearm.engine.fit.rounds import (
     Redundant,
     Solved,
@@ -97,9 +95,7 @@ def refit_draws(
         progress(f"bootstrap {_bar(number, count)} {number + 1} of {count}")
         drawn = problem.data.of_configurations(rng.integers(n, size=n))
         again = replace(problem, data=drawn, free=started)
-        draws[number] = solve_with_joints(
-            again, joints, loss, solved.limits, _SMALL, solved.curves.design_effect
-        ).vector
+        draws[number] = solve_with_joints(again, joints, loss, solved.limits, _SMALL).vector
     return draws
 
 
@@ -323,8 +319,8 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
     ]
     robot = in_the_middle(start.with_parameters(identified), problem.data)
     dropped = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
-    # What is expected of curves is found from the data, and their deviations say where nothing else is known.
-    weighed = {*solved.curves.places, *solved.sizes.place}
+    # What is expected of these is found from the data, and their deviations say where nothing else is known.
+    weighed = set(solved.sizes.place)
     looked_at = FreeParameters((*(robot.parameters[n] for n in free.names if n not in weighed), *dropped))
     unobservable = unobservable_parameters(robot, problem.data, looked_at, fixed=solved.fixed)
     unobservable = tuple(dict.fromkeys((*unobservable, *open_)))
@@ -392,7 +388,7 @@ def _worth(
         covariance, parts = components.covariance, components.parts
     else:
         covariance, parts = cluster_covariance(
-            lambda: _pulled(problem, solution, loss, solved.curves.design_effect),
+            lambda: _pulled(problem, solution, loss),
             Visits(problem.visits),
             ~at_bound,
             _beforehand(problem, limits, open_),
@@ -409,7 +405,7 @@ def _worth(
         of_bounds = np.clip(1.0 - (deviation / np.where(bounded, evenly, 1.0)) ** 2, 0.0, 1.0)
         informed = np.where(bounded, np.minimum(informed, of_bounds), informed)
     parts, unfitted = tuple(part.scaled(free.prior) for part in parts), tuple[str, ...]()
-    if solved.curves.variances or solved.sizes:
+    if solved.sizes:
         known = dict(zip(free.names, x.tolist(), strict=True))
         at_solution = replace(
             problem,
@@ -419,13 +415,11 @@ def _worth(
         joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
         alone = parts[0] if scattered or draws is not None else None
         erring = joints > 0.0 if components is None else components.likeliest.joints > 0.0
-        sizes_of = partial(expected_sizes, solved.sizes)
-        unfitted, parts, told = parts_with_curves(
-            at_solution, solved.curves, joints, erring, solution.weight, at_bound, alone, sizes_of
+        unfitted, parts, told = parts_with_sizes(
+            at_solution, solved.sizes, joints, erring, solution.weight, at_bound, alone
         )
         covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
-        if solved.sizes:
-            informed = np.clip(told[: len(x)], 0.0, 1.0)
+        informed = np.clip(told[: len(x)], 0.0, 1.0)
     return covariance, parts, informed, unfitted
 
 
@@ -450,14 +444,12 @@ def _weights(problem: Problem, solution: Solution, loss: Loss) -> Array:
     return weight
 
 
-def _pulled(
-    problem: Problem, solution: Solution, loss: Loss, design_effect: float
-) -> Iterator[tuple[Rows, Array, Array]]:
+def _pulled(problem: Problem, solution: Solution, loss: Loss) -> Iterator[tuple[Rows, Array, Array]]:
     """Go through the equations, with what each tells of the parameters and pulls them with, per prior."""
-    root, prior = np.sqrt(design_effect), problem.free.prior
-    scales = scales_of_pulls(loss, solution.residual / root, problem.components, len(prior))
+    prior = problem.free.prior
+    scales = scales_of_pulls(loss, solution.residual, problem.components, len(prior))
     for rows, part in evaluated(problem, solution).portions():
-        pull, sensitivity = pulls(loss, part.residual / root, part.jacobian / root, part.problem.components, scales)
+        pull, sensitivity = pulls(loss, part.residual, part.jacobian, part.problem.components, scales)
         yield rows, sensitivity * prior, pull * prior
 
 

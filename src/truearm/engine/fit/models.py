@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from truearm.engine.base.errors import InputError, did_you_mean
+from truearm.engine.robot.effects.fourier import HARMONICS, Fourier
 from truearm.engine.robot.effects.joint_curve import HIGHEST, PRIOR, JointCurve, curve_names
 from truearm.engine.robot.parameters import SCALE_GROUP, FreeParameters, Group
 from truearm.engine.robot.robot import Robot
@@ -48,9 +49,10 @@ class Model:
     def free(self, robot: Robot) -> FreeParameters:
         """Return the free parameters of a robot, base first, targets and fixtures last."""
         groups = ("base", "target", "fixture", SCALE_GROUP, *self.groups, *self.effects)
+        lowest = max(HARMONICS) if Fourier.name in self.effects else 0  # these are in the Fourier series
         turns = range(1, len(robot.joints) + 1)
-        beyond = {name for number in turns for name in curve_names(number)[2 * self.highest :]}
-        free = (p for p in robot.parameters.values() if p.group in groups and p.name not in beyond)
+        fixed = {name for n in turns for k, name in enumerate(curve_names(n)) if not lowest <= k // 2 < self.highest}
+        free = (p for p in robot.parameters.values() if p.group in groups and p.name not in fixed)
         return FreeParameters(tuple(free))
 
 

@@ -16,7 +16,6 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.fit.bounds import Bounds, bound_vectors
-from truearm.engine.fit.curves import NO_CURVES, Curves, with_stiffness
 from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.fit.likelihood import Linearised, Visits, WhitenedProblem, Whitening
 from truearm.engine.fit.losses import Loss, norms_of, scale_of, weighed_together
@@ -32,7 +31,7 @@ from truearm.engine.fit.problem import (
     find_redundancies,
     gauge_freedoms,
 )
-from truearm.engine.fit.relevance import NO_SIZES, Sizes, with_sizes
+from truearm.engine.fit.relevance import NO_SIZES, ROUNDS_OF_CURVES, Sizes, with_sizes
 from truearm.engine.fit.solver import SMALL, Solution, solve
 from truearm.engine.fit.start_values import start_from_readings, unanchored
 from truearm.engine.fit.variance_components import Components, CovariancePart, beyond_chance, variance_components
@@ -62,8 +61,8 @@ _UNSEEN: Final = 1e-3
 #: Relative change of the size of an effect that changes nothing, and the last step of solutions meanwhile [priors].
 _SIZES_SETTLED: Final = 0.1
 _COARSE: Final = 0.01
-#: Rounds in which the sizes of effects are found before curves of the joints join in.
-_ROUNDS_OF_SIZES: Final = 2
+#: Coordinates that say where a target is.
+_COORDINATES: Final = 3
 _LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
 
 
@@ -82,7 +81,6 @@ class Solved:
     #: Variances of the readings and of the joints' errors at the solution; None for losses other than the linear one.
     components: Components | None
     fixed: FixedPlaces = NOTHING_FIXED  #: Places that were known.
-    curves: Curves = NO_CURVES  #: The curves of the joints, where the model has them.
     sizes: Sizes = NO_SIZES  #: How large the effects are expected to be, where the data tell.
 
     @property
@@ -113,8 +111,7 @@ def find_parameters(
     Args:
         shared: Whether errors of the joints that the readings of a visit share are looked for, with the linear loss.
         near: A solution from the same data, of a robot that is the same but for further parameters of effects. The
-            search begins at its values and variances, and its curves keep their priors. The robot given is its start
-            with those.
+            search begins at its values and variances. The robot given is its start with those.
     """
     robot = robot.marked(data.simulated)
     start = start_from_readings(model.prepared(robot), data, fixed) if near is None else model.prepared(robot)
@@ -139,7 +136,7 @@ def find_parameters(
             _check_dropped(out, free, check_bounds, bounds_file)
         retained = problem.free.without(out)
         limits = None if check_bounds is None else _limits_of(check_bounds, free, retained)
-        solution, reduced, components, curves, sizes = _solve_with_noise(
+        solution, reduced, components, sizes = _solve_with_noise(
             replace(problem, free=retained),
             loss,
             limits,
@@ -147,7 +144,7 @@ def find_parameters(
             shared=shared and redundancy != "none",
             joints=joints,
             weighed=model.weighed,
-            curves=None if near is None else near.curves,
+            near=None if near is None else near.sizes,
         )
         steps += solution.steps
         if redundancy != "drop":
@@ -168,8 +165,7 @@ def find_parameters(
         limits = _limits_of(check_bounds, free, reduced.free)
     if reduced.priors and "size" in gauge_freedoms(data, fixed):
         solution = _not_shrunk(reduced, solution, limits)
-    start = start.with_parameters(curves.priors_of(start))
-    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, fixed, curves, sizes)
+    return Solved(start, reduced, replace(solution, steps=steps), dropped, limits, components, fixed, sizes)
 
 
 def _checked(
@@ -291,20 +287,19 @@ def _solve_with_noise(
     shared: bool,
     joints: Array | None = None,
     weighed: bool = False,
-    curves: Curves | None = None,
-) -> tuple[Solution, Problem, Components | None, Curves, Sizes]:
-    """Solve; then again with what the solution says of deviations, of the joints' curves and of the loads.
+    near: Sizes | None = None,
+) -> tuple[Solution, Problem, Components | None, Sizes]:
+    """Solve; then again with what the solution says of deviations, of the sizes of effects and of the loads.
 
     Deviations are estimated where they are not declared. Declared ones are widened where the residuals are larger than
     they, and errors of the joints that a visit's readings share, allow: believed to the letter, readings that the
-    model cannot follow would overrule every prior, for the sake of directions that they hardly observe. Curves of the
-    joints join in when the first solution has told how stiff they are. Where the readings turn out not to tell a
-    deviation, all is solved once more with it as it was declared, or assumed.
+    model cannot follow would overrule every prior, for the sake of directions that they hardly observe. Where the
+    readings turn out not to tell a deviation, all is solved once more with it as it was declared, or assumed.
     """
     untold: frozenset[str] = frozenset()
     while True:
         result = _solve_in_rounds(
-            problem, loss, limits, small, shared=shared, joints=joints, untold=untold, weighed=weighed, curves=curves
+            problem, loss, limits, small, shared=shared, joints=joints, untold=untold, weighed=weighed, near=near
         )
         more = _untold(result[1], result[2]) - untold
         if not more:
@@ -343,22 +338,20 @@ def _solve_in_rounds(
     joints: Array | None,
     untold: frozenset[str],
     weighed: bool,
-    curves: Curves | None,
-) -> tuple[Solution, Problem, Components | None, Curves, Sizes]:
+    near: Sizes | None,
+) -> tuple[Solution, Problem, Components | None, Sizes]:
     """Solve in rounds, with the deviations of what is `untold` as they are."""
     every, within = problem, limits
-    curves = Curves.none_of(problem) if curves is None else curves
-    if curves:
-        problem = replace(problem, free=curves.known_of(problem.free))
+    sizes = Sizes.of(problem, every=weighed, near=near)
+    if sizes.curves:
+        problem = replace(problem, free=sizes.fitted(problem.free))
         limits = _within(within, every.free, problem.free)
-    sizes = Sizes.none_of(problem) if weighed else NO_SIZES
-    priors = {p.name: p.prior for p in every.free.parameters}
     joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
     step = _COARSE if sizes else small
     solution = solve_with_joints(problem, joints, loss, limits, step)
     steps = solution.steps
     components = None
-    most = _ROUNDS + (curves.rounds if curves else 0) + (_ROUNDS if sizes else 0)
+    most = _ROUNDS + (_ROUNDS + ROUNDS_OF_CURVES if sizes else 0)
     for number in range(most):
         if loss == "linear" and shared:
             components = estimated_components(problem, solution, limits, components, untold, each=weighed)
@@ -369,13 +362,13 @@ def _solve_in_rounds(
         started = FreeParameters(tuple(replace(p, value=values[p.name]) for p in problem.free.parameters))
         next_problem = replace(next_problem, robot=problem.robot.with_values(values), free=started)
         if step > small:
-            next_problem, sizes, more, joints = with_sizes(next_problem, sizes, joints, solution.weight, priors)
+            hold = components is not None and components.holds and joints.any()
+            crowd = 1.0 if hold else max(1.0, problem.rows / (_COORDINATES * len(np.unique(problem.visits))))
+            next_problem, sizes, more, joints = with_sizes(
+                next_problem, every.free, sizes, joints, solution.weight, crowd
+            )
+            limits = _within(within, every.free, next_problem.free)
             change = max(change, more * _SETTLED / _SIZES_SETTLED)
-        if curves.rounds and (number >= _ROUNDS_OF_SIZES or not sizes):
-            next_problem, curves, joints = with_stiffness(next_problem, every.free, curves, joints, solution.weight)
-            limits, change = _within(within, every.free, next_problem.free), np.inf
-        elif curves.rounds:
-            change = np.inf  # they join in before it ends
         if change < _SETTLED and _load_shift(problem, next_problem) < _LOADS_AGREE * step:
             if step == small:
                 break
@@ -384,9 +377,9 @@ def _solve_in_rounds(
             components = None  # with curves it is asked again whether the joints err
         problem = next_problem
         step = small if number == most - _ROUNDS else step
-        solution = solve_with_joints(problem, joints, loss, limits, step, curves.design_effect)
+        solution = solve_with_joints(problem, joints, loss, limits, step)
         steps += solution.steps
-    return replace(solution, steps=steps), problem, components, curves, sizes
+    return replace(solution, steps=steps), problem, components, sizes
 
 
 def _within(
@@ -401,24 +394,13 @@ def solve_with_joints(
     loss: Loss,
     limits: tuple[Array, Array] | None,
     small: float,
-    design_effect: float = 1.0,
 ) -> Solution:
-    """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own.
-
-    Args:
-        design_effect: How many times larger the variances of the readings are taken, because they hang together.
-    """
-    root = float(np.sqrt(design_effect))
-    taken = problem
-    if root != 1.0:
-        noise = {name: deviation * root for name, deviation in problem.noise.items()}
-        taken = replace(problem, noise=noise, widened=problem.widened * root)
-    if joints.any():
-        shared = taken.at(taken.free.start).by_joints * np.sqrt(joints * design_effect)
-        solution = solve(WhitenedProblem(taken, Whitening(Visits(taken.visits), shared)), loss, limits, small)
-    else:
-        solution = solve(taken, loss, limits, small)
-    return replace(solution, at=problem.at(solution.vector)) if joints.any() or root != 1.0 else solution
+    """Solve with the variances of the joints' errors as they are; residual and Jacobian are the readings' own."""
+    if not joints.any():
+        return solve(problem, loss, limits, small)
+    shared = problem.at(problem.free.start).by_joints * np.sqrt(joints)
+    solution = solve(WhitenedProblem(problem, Whitening(Visits(problem.visits), shared)), loss, limits, small)
+    return replace(solution, at=problem.at(solution.vector))
 
 
 def evaluated(problem: Problem, solution: Solution) -> Evaluation:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.diagnose.curves import check_curves, check_curves_of_loads, share_of_loads
+from truearm.engine.diagnose.curves import check_curves_of_loads, share_of_loads
 from truearm.engine.diagnose.unmodelled import LeftOver
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import named_model
@@ -60,9 +61,11 @@ def test_nothing_is_told_where_nothing_loads_the_joints_or_there_is_no_curve() -
     assert share_of_loads(LeftOver.of(identify(arm(), data, named_model("geometric")), data)) == 0.0
 
 
-def test_curves_beside_the_periods_they_contain_are_told() -> None:
-    data, fit = fitted("gears")
-    assert not any(notice.code == "curves-and-fourier" for notice in check_curves(fit, data))
-    data, fit = fitted("gears", "fourier")
-    notice = next(notice for notice in check_curves(fit, data) if notice.code == "curves-and-fourier")
-    assert notice.level == "note"
+def test_curves_leave_the_periods_of_a_fourier_series_to_it() -> None:
+    _, alone = fitted("gears")
+    assert any(name.startswith("curve_sin1_") for name in alone.free.names)
+    _, beside = fitted("gears", "fourier")
+    low = [name for name in beside.free.names if re.match(r"curve_(sin|cos)[12]_", name)]
+    assert low == []
+    assert any(name.startswith("curve_") for name in beside.free.names)
+    assert any(name.startswith("fourier_sin1_") for name in beside.free.names)

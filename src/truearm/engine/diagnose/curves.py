@@ -17,7 +17,6 @@ from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver
 from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.compliance import Compliance
-from truearm.engine.robot.effects.fourier import Fourier
 from truearm.engine.robot.effects.joint_curve import HIGHEST, JointCurve, curve_names, curve_waves
 from truearm.engine.robot.loads import has_weight
 from truearm.engine.robot.parameters import FreeParameters
@@ -65,9 +64,6 @@ CURVE_LEFT_OUT: Final = Rule(
     "note",
     "joints for which the data show no [curve](joint-curves.md), or that turned too little to tell one from geometry",
 )
-CURVES_AND_FOURIER: Final = Rule(
-    "curves-and-fourier", "note", "a model with `joint-curve` and `fourier`, which curves contain", gravity=0
-)
 CURVE_RANGE: Final = Rule(
     "curve-range",
     "note",
@@ -106,13 +102,6 @@ def check_curves(fit: Fit, training: Dataset) -> list[Notice]:
             CURVE_LEFT_OUT(
                 f"Joints without a curve (in brackets how far each turned): {sentence}. More configurations, through "
                 "more of the turn, may show one."
-            )
-        )
-    if Fourier.name in fit.model.effects and not fit.model.weighed:
-        notices.append(
-            CURVES_AND_FOURIER(
-                "The model has curves of the joints and the effect fourier, whose one and two periods a turn curves "
-                "contain. The readings do not tell the two apart: leave fourier out."
             )
         )
     if partly:

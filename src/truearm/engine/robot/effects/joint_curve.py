@@ -2,9 +2,9 @@
 
 The curve is a Fourier series of the joint's own angle. An eccentric wheel at the output errs once in a turn, an oval
 one twice (Nubiola, section 1.8); teeth, encoders and the strain waves of small gears err more often. No period has to
-be known: how much is expected of each beforehand, and so how stiff the curve is against fast changes, a fit finds from
-the data, joint by joint (:mod:`truearm.engine.fit.curves`). Gears that err more than sixty times
-in a turn are the business of :mod:`truearm.engine.robot.effects.transmission`.
+be known: how much is expected of those of a band beforehand, and so how stiff the curve is against fast changes, a fit
+finds from the data, joint by joint (:mod:`truearm.engine.fit.relevance`). Gears that err more than sixty times in a
+turn are the business of :mod:`truearm.engine.robot.effects.transmission`.
 """
 
 from __future__ import annotations

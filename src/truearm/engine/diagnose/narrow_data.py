@@ -121,7 +121,7 @@ def check_few_to_doubt(fit: Fit) -> list[Notice]:
 _ERROR: Final = 3.0
 _WARNING: Final = 2.0
 #: Below this no instrument sees a robot move, and simulated readings without noise would be doubted [m].
-_NEGLIGIBLE: Final = 5e-6
+_NEGLIGIBLE: Final = 2e-6
 #: Mean length of an error of three normal coordinates over the mean size of one.
 _OF_ONE: Final = 2.0
 #: Share of its limits (of a full turn, where they allow more) below which a joint has moved little.

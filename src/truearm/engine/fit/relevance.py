@@ -383,9 +383,6 @@ def inverse_of(matrix: Array) -> Array:
 #: Deviations that are tried for a group, and the largest by that found.
 _LEVELS: Final = 25
 _LARGER: Final = 3.0
-#: Deviation up to which curves of one period are about as likely, by their prior; it falls as one by the number of
-#: periods. Gears and encoders do err, and few readings do not tell.
-_OF_CURVES: Final = 0.6
 #: Share of the variance of the readings that all coefficients of curves which are left out may move them by together.
 _NEGLIGIBLE: Final = 1e-3
 #: Degrees of freedom of the level of the errors: variances of groups are known from a few dozen parameters, and what
@@ -491,9 +488,10 @@ def expected_sizes(sizes: Sizes, of: Moments, names: Sequence[str]) -> Array:
         tried = np.geomspace(_LEAST, max(1.0, _LARGER * now), _LEVELS)
         larger = ((tried / now) ** 2)[:, None]
         height = 0.5 * (larger * pull / (1.0 + larger * told) - np.log1p(larger * told)).sum(axis=1)
-        # What is believed of it, where it is tried evenly in its logarithm.
+        # What is believed of it, where it is tried evenly in its logarithm. Gears and encoders do err, and few readings
+        # do not tell: curves are about as likely up to their prior, which falls as one by the number of periods.
         if key[0] == JointCurve.name:
-            height += np.log(tried) - np.log1p((tried * BANDS[int(key[3]) - 1] / _OF_CURVES) ** 4)
+            height += np.log(tried) - np.log1p((tried * BANDS[int(key[3]) - 1]) ** 4)
         else:
             height -= np.log1p((tried / max(float(scale), _LEAST)) ** 2)
         likely = np.exp(height - height.max())

@@ -191,17 +191,17 @@ def _shares(robot: Robot, fit: Fit, data: Dataset, lines: tuple[PeriodicError, .
     at = identified.loaded(data.postures)
     whole = _places(identified, at, data)
     for effect in EFFECTS:
-        free = [p for p in fit.free.parameters if p.group == effect.name]
+        names = [n for n in (*fit.free.names, *fit.unfitted) if identified.parameters[n].group == effect.name]
         if effect.name not in fit.model.effects:
             if effect.name not in _ASKED_FOR:
                 reason = closed_because(robot, data, effect.name) or "the data do not tell it"
                 shares.append(EffectShare(effect.name, None, 0.0, 0, reason))
             continue
-        parameters = [identified.parameters[p.name] for p in free]
+        parameters = [identified.parameters[name] for name in names]
         known = sum(p.informed or 0.0 for p in parameters)
         moved = whole - _places(identified.with_values({p.name: p.nominal for p in parameters}), at, data)
         moves = float(np.sqrt(np.mean(np.sum(moved**2, axis=1)))) if len(moved) else 0.0
-        shares.append(EffectShare(effect.name, moves, known, len(free)))
+        shares.append(EffectShare(effect.name, moves, known, len(names)))
     return Shares(tuple(sorted(shares, key=lambda share: -(share.moves or 0.0))), lines)
 
 

@@ -111,10 +111,10 @@ class Sizes:
         graded = [p for members in groups.values() for p in members]
         curves = {p.name: curve[p.name][0] for p in graded if p.name in curve}
         wait = (_BEFORE_CURVES if every else 0) if curves else -ROUNDS_OF_CURVES
-        known = (
-            {} if near is None else dict(zip(near.groups, zip(near.deviation, near.scale, strict=True), strict=True))
-        )
-        deviation, scale = np.array([known.get(key, (_LEAST, 0.0)) for key in groups]).reshape(-1, 2).T
+        begin = {key: (_LEAST if key[0] == JointCurve.name else 1.0, 0.0) for key in groups}
+        if near is not None:
+            begin |= dict(zip(near.groups, zip(near.deviation, near.scale, strict=True), strict=True))
+        deviation, scale = np.array([begin[key] for key in groups]).reshape(-1, 2).T
         return cls(
             {key: tuple(p.name for p in members) for key, members in groups.items()},
             {p.name: p.prior for p in graded},
@@ -131,9 +131,9 @@ class Sizes:
         return {name: k for k, names in enumerate(self.groups.values()) for name in names}
 
     def fitted(self, every: FreeParameters) -> FreeParameters:
-        """Return the parameters that are fitted: all but the coefficients of curves that nothing is known of."""
+        """Return the parameters that are fitted: all but those of groups that shrank to nothing."""
         return FreeParameters(
-            tuple(p for p in every.parameters if p.name not in self.curves or self._deviation_of(p) > _LEAST)
+            tuple(p for p in every.parameters if p.name not in self.place or self._deviation_of(p) > _LEAST)
         )
 
     def sized(self, parameter: Parameter) -> Parameter:
@@ -166,7 +166,11 @@ def with_sizes(
     """
     looking = -ROUNDS_OF_CURVES < sizes.before_curves <= 0  # at all bands of the curves
     fitted = set(problem.free.names)
-    aside = [problem.robot.parameters[name] for name in sizes.curves if looking and name not in fitted]
+    aside = [
+        problem.robot.parameters[name]
+        for name in sizes.place
+        if name not in fitted and (looking or name not in sizes.curves)
+    ]
     parameters = (*problem.free.parameters, *aside)
     graded = np.array([p.name in sizes.place for p in parameters])
     own = [p for p in parameters if p.name in sizes.place]
@@ -400,7 +404,7 @@ def parts_with_sizes(
     certain: NDArray[np.bool_],
     scatter: CovariancePart | None,
 ) -> tuple[tuple[str, ...], tuple[CovariancePart, ...], Array]:
-    """Return what the parameters of a fit with sizes are off by, and the coefficients that were not fitted.
+    """Return what the parameters of a fit with sizes are off by, and those that were not fitted.
 
     Args:
         problem: At the solution, whose values its free parameters have.
@@ -413,12 +417,12 @@ def parts_with_sizes(
             their scatter.
 
     Returns:
-        names, parts: Of the coefficients that are zero in the fit and may not be, and the parts of the covariance [SI]
-            of the free parameters and, behind them, of these.
+        names, parts: Of the parameters that are zero in the fit and may not be, and the parts of the covariance [SI] of
+            the free parameters and, behind them, of these.
         informed: Share of the expected variance of each that the readings removed.
     """
     free, fitted = problem.free.parameters, set(problem.free.names)
-    aside = [sizes.sized(problem.robot.parameters[name]) for name in sizes.curves if name not in fitted]
+    aside = [sizes.sized(problem.robot.parameters[name]) for name in sizes.place if name not in fitted]
     parameters = (*free, *aside)
     of = moments_of(problem, parameters, joints, weight)
     expected = expected_sizes(sizes, of, [p.name for p in parameters])
@@ -426,12 +430,12 @@ def parts_with_sizes(
     whole, beforehand, informed = _mean_squared_error(of, sure, expected)
     own = {joint for name, joint in sizes.curves.items() if name in fitted}
     size = np.array([p.prior for p in parameters])
-    joint = np.array([sizes.curves[p.name] for p in aside], dtype=np.intp)
-    moved = (expected * size**2)[len(free) :] * of.by_joint[joint] / 2.0
+    joint = np.array([sizes.curves.get(p.name, -1) for p in aside], dtype=np.intp)
+    moved = np.where(joint < 0, np.inf, (expected * size**2)[len(free) :] * of.by_joint[joint] / 2.0)
     order = np.argsort(moved)
     matters = np.ones(len(aside), dtype=bool)
     matters[order] = np.cumsum(moved[order]) > _NEGLIGIBLE * of.rows
-    possible = np.array([i in own or not erring[i] for i in joint.tolist()], dtype=bool)
+    possible = np.array([i < 0 or i in own or not erring[i] for i in joint.tolist()], dtype=bool)
     chosen = np.concatenate([np.arange(len(free)), len(free) + np.flatnonzero(matters & possible)])
     names = tuple(parameters[k].name for k in chosen[len(free) :].tolist())
     among, size = np.ix_(chosen, chosen), size[chosen]

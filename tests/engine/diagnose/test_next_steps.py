@@ -346,7 +346,7 @@ def test_few_configurations_cannot_tell_errors_of_gears() -> None:
         assert "no effect known here explains" not in step.message
         assert "cannot be told from 18 training configurations: measure about 200" in step.message
     every = calibrate("irb120", elastic(), model="auto")  # other effects stand in for them, and for the payload
-    assert [step.code for step in every.next] == ["see-warning"]
+    assert "see-warning" in {step.code for step in every.next}
     assert "payload-unlikely" in {notice.code for notice in every.warnings}
 
 

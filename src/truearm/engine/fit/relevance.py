@@ -22,7 +22,7 @@ from truearm.engine.fit.problem import NOISE_FLOOR, Problem
 from truearm.engine.fit.variance_components import CovariancePart
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.compliance import Compliance
-from truearm.engine.robot.effects.joint_curve import JointCurve
+from truearm.engine.robot.effects.joint_curve import HIGHEST, JointCurve
 from truearm.engine.robot.effects.warm_up import RATE
 from truearm.engine.robot.parameters import FreeParameters, Parameter
 
@@ -47,12 +47,13 @@ _AGAIN: Final = 0.1
 _LEAST: Final = 1e-3
 _MOST: Final = 3.0
 _MOST_OF_CURVES: Final = 1e3
-#: Gain in log-likelihood from which the curve of a joint is believed. A robot has six, of five bands each.
+#: Gain in log-likelihood from which the curve of a joint is believed. A robot has six, of ten or twenty bands.
 _SIGNIFICANT: Final = 8.0
 _STEPS: Final = 60
 _SETTLED: Final = 0.02
-#: First periods in a turn of the bands of a curve.
-BANDS: Final = (1, 3, 6, 11, 19, 33)
+#: First periods in a turn of the bands of a curve. A gear makes a few lines: a wide band would shrink them with the
+#: rest, and few readings do not tell narrow ones.
+BANDS: Final = (1, *range(3, HIGHEST, 3))
 #: Rounds before curves join in, where other effects have sizes too, and how often all their bands are looked at: the
 #: noise that is left without a curve is not that with it.
 _BEFORE_CURVES: Final = 2
@@ -470,7 +471,9 @@ def _mean_squared_error(of: Moments, certain: NDArray[np.bool_], expected: Array
 def expected_sizes(sizes: Sizes, of: Moments, names: Sequence[str]) -> Array:
     """Return what the variance of each parameter is expected to be, by that of its prior now, ``(names,)``.
 
-    It is the mean of what the data leave likely of each group's variance, those of the others as they are.
+    It is the mean of what the data leave likely of each group's variance, those of the others as they are. Gears and
+    encoders do err, and few readings do not tell: curves are about as likely up to their prior, which falls as one by
+    the number of periods, or up to what they are in the joints whose readings tell.
 
     Args:
         of: The equations at the solution, of parameters per prior.
@@ -482,7 +485,10 @@ def expected_sizes(sizes: Sizes, of: Moments, names: Sequence[str]) -> Array:
     C = inverse_of(of.products[:-1, :-1] + np.eye(len(names)))
     mean = C @ of.products[:-1, -1]
     place = np.array([sizes.place.get(name, -1) for name in names])
-    for k, (key, now, scale) in enumerate(zip(sizes.groups, sizes.deviation, sizes.scale, strict=True)):
+    scale = np.maximum(sizes.scale, _LEAST)
+    likely: dict[int, tuple[Array, Array]] = {}
+    seen = np.zeros(len(scale))
+    for k, now in enumerate(sizes.deviation.tolist()):
         mine = np.flatnonzero(place == k)
         if not len(mine):
             continue
@@ -491,15 +497,21 @@ def expected_sizes(sizes: Sizes, of: Moments, names: Sequence[str]) -> Array:
         told, pull = np.maximum(told, 0.0), (turned.T @ (precision @ mean[mine])) ** 2
         tried = np.geomspace(_LEAST, max(1.0, _LARGER * now), _LEVELS)
         larger = ((tried / now) ** 2)[:, None]
-        height = 0.5 * (larger * pull / (1.0 + larger * told) - np.log1p(larger * told)).sum(axis=1)
-        # What is believed of it, where it is tried evenly in its logarithm. Gears and encoders do err, and few readings
-        # do not tell: curves are about as likely up to their prior, which falls as one by the number of periods.
+        likely[k] = tried, 0.5 * (larger * pull / (1.0 + larger * told) - np.log1p(larger * told)).sum(axis=1)
+        seen[k] = float(np.mean(told / (told + now**2)))  # of parameters as large as their prior
+    for band in range(1, len(BANDS) + 1):
+        alike = [k for k, key in enumerate(sizes.groups) if key[0] == JointCurve.name and int(key[3]) == band]
+        square = float(seen[alike] @ sizes.deviation[alike] ** 2) / max(float(seen[alike].sum()), 1e-300)
+        scale[alike] = max(1.0 / BANDS[band - 1], square**0.5)
+    for k, (key, (tried, height)) in enumerate(zip(sizes.groups, likely.values(), strict=True)):
+        # What is believed of it, where it is tried evenly in its logarithm.
         if key[0] == JointCurve.name:
-            height += np.log(tried) - np.log1p((tried * BANDS[int(key[3]) - 1]) ** 4)
+            power, believed = 2, np.log(tried) - np.log1p((tried / scale[k]) ** 4)
         else:
-            height -= np.log1p((tried / max(float(scale), _LEAST)) ** 2)
-        likely = np.exp(height - height.max())
-        expected[mine] = float(likely @ (tried / now) / likely.sum()) ** 2
+            power, believed = 1, -np.log1p((tried / scale[k]) ** 2)
+        weight = np.exp(height + believed - (height + believed).max())
+        size = float(weight @ tried**power / weight.sum()) ** (1.0 / power)
+        expected[place == k] = (size / sizes.deviation[k]) ** 2
     return expected
 
 

@@ -317,7 +317,13 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
         else replace(start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
         for n, v, d, i, bound in zip(free.names, x, deviation, informed, at_bound, strict=True)
     ]
-    robot = in_the_middle(start.with_parameters(identified), problem.data)
+    uncertain = np.sqrt(np.diag(np.sum([part.covariance for part in parts], axis=0)))[len(x) :].tolist()
+    shrunk = [
+        replace(start.parameters[n], deviation=d, informed=0.0)
+        for n, d in zip(unfitted, uncertain, strict=True)
+        if n in solved.sizes.place and n not in solved.sizes.curves
+    ]
+    robot = in_the_middle(start.with_parameters([*identified, *shrunk]), problem.data)
     dropped = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     # What is expected of these is found from the data, and their deviations say where nothing else is known.
     weighed = set(solved.sizes.place)

@@ -388,6 +388,8 @@ def inverse_of(matrix: Array) -> Array:
 #: Deviations that are tried for a group, and the largest by that found.
 _LEVELS: Final = 25
 _LARGER: Final = 3.0
+#: Probability that a joint errs in a band of its curve at all. At one and two periods, where encoders do, it is one.
+_ERRING: Final = 0.1
 #: Share of the variance of the readings that all coefficients of curves which are left out may move them by together.
 _NEGLIGIBLE: Final = 1e-3
 #: Degrees of freedom of the level of the errors: variances of groups are known from a few dozen parameters, and what
@@ -495,7 +497,7 @@ def expected_sizes(sizes: Sizes, of: Moments, names: Sequence[str]) -> Array:
         precision = np.linalg.inv(C[np.ix_(mine, mine)])
         told, turned = np.linalg.eigh(precision - np.eye(len(mine)))
         told, pull = np.maximum(told, 0.0), (turned.T @ (precision @ mean[mine])) ** 2
-        tried = np.geomspace(_LEAST, max(1.0, _LARGER * now), _LEVELS)
+        tried = np.geomspace(_LEAST, _LARGER * max(1.0, now), _LEVELS)
         larger = ((tried / now) ** 2)[:, None]
         likely[k] = tried, 0.5 * (larger * pull / (1.0 + larger * told) - np.log1p(larger * told)).sum(axis=1)
         seen[k] = float(np.mean(told / (told + now**2)))  # of parameters as large as their prior
@@ -505,11 +507,13 @@ def expected_sizes(sizes: Sizes, of: Moments, names: Sequence[str]) -> Array:
         scale[alike] = max(1.0 / BANDS[band - 1], square**0.5)
     for k, (key, (tried, height)) in enumerate(zip(sizes.groups, likely.values(), strict=True)):
         # What is believed of it, where it is tried evenly in its logarithm.
+        power, believed = 1, 1.0 / (1.0 + (tried / scale[k]) ** 2)
         if key[0] == JointCurve.name:
-            power, believed = 2, np.log(tried) - np.log1p((tried / scale[k]) ** 4)
-        else:
-            power, believed = 1, -np.log1p((tried / scale[k]) ** 2)
-        weight = np.exp(height + believed - (height + believed).max())
+            erring = 1.0 if key[3] == "1" else _ERRING
+            power, believed = 2, tried / (1.0 + erring**2 * (tried / scale[k]) ** 4)
+            believed *= erring / believed.sum()
+            believed[0] += 1.0 - erring
+        weight = np.exp(height - height.max()) * believed
         size = float(weight @ tried**power / weight.sum()) ** (1.0 / power)
         expected[place == k] = (size / sizes.deviation[k]) ** 2
     return expected

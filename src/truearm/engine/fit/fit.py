@@ -47,7 +47,7 @@ from truearm.engine.fit.start_values import start_from_readings, unanchored
 from truearm.engine.fit.variance_components import Components, CovariancePart, cluster_covariance, widening
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.warm_up import LEFT, RATE, share_left
-from truearm.engine.robot.parameters import SCALE, FreeParameters
+from truearm.engine.robot.parameters import SCALE, FreeParameters, Parameter
 from truearm.engine.robot.robot import Robot
 
 #: Configurations below which draws are too much alike.
@@ -310,20 +310,8 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
     if problem.data.number is not None and LEFT in start.parameters:
         share = share_left(problem.data.number, in_the_middle(solved.robot, problem.data).values[RATE])
         parts, unfitted = _with_uncertain(parts, float(share.var())), (*unfitted, LEFT)
-    deviation = np.sqrt(np.diag(covariance))
-    identified = [
-        replace(start.parameters[n], value=float(v))
-        if bound
-        else replace(start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
-        for n, v, d, i, bound in zip(free.names, x, deviation, informed, at_bound, strict=True)
-    ]
-    uncertain = np.sqrt(np.diag(np.sum([part.covariance for part in parts], axis=0)))[len(x) :].tolist()
-    shrunk = [
-        replace(start.parameters[n], deviation=d, informed=0.0)
-        for n, d in zip(unfitted, uncertain, strict=True)
-        if n in solved.sizes.place and n not in solved.sizes.curves
-    ]
-    robot = in_the_middle(start.with_parameters([*identified, *shrunk]), problem.data)
+    found = [*_identified(solved, covariance, informed, at_bound), *_shrunk(solved, parts, unfitted)]
+    robot = in_the_middle(start.with_parameters(found), problem.data)
     dropped = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     # What is expected of these is found from the data, and their deviations say where nothing else is known.
     weighed = set(solved.sizes.place)
@@ -371,6 +359,25 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
         bootstrap=0 if draws is None else len(draws),
         unfitted=unfitted,
     )
+
+
+def _identified(solved: Solved, covariance: Array, informed: Array, at_bound: NDArray[np.bool_]) -> list[Parameter]:
+    """Return the fitted parameters with what was found; one at a bound has no deviation."""
+    names, deviation = solved.problem.free.names, np.sqrt(np.diag(covariance))
+    return [
+        replace(solved.start.parameters[n], value=float(v))
+        if bound
+        else replace(solved.start.parameters[n], value=float(v), deviation=float(d), informed=float(i))
+        for n, v, d, i, bound in zip(names, solved.solution.vector, deviation, informed, at_bound, strict=True)
+    ]
+
+
+def _shrunk(solved: Solved, parts: Sequence[CovariancePart], unfitted: Sequence[str]) -> list[Parameter]:
+    """Return the parameters of effects that shrank to nothing, with what they may be off by."""
+    deviation = np.sqrt(np.diag(np.sum([part.covariance for part in parts], axis=0)))
+    effects = solved.sizes.place.keys() - solved.sizes.curves.keys()
+    beside = zip(unfitted, deviation[len(solved.problem.free.names) :].tolist(), strict=True)
+    return [replace(solved.start.parameters[n], deviation=d, informed=0.0) for n, d in beside if n in effects]
 
 
 def _sigma_of(name: str, problem: Problem, components: Components | None, is_declared: bool) -> float:

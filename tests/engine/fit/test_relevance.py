@@ -127,7 +127,7 @@ def two_groups() -> Sizes:
         ("a", "rad", "1"): ("a1", "a2", "a3"),
         ("b", "rad", ""): ("b1", "b2"),
     }
-    return Sizes(groups, deviation=np.array([0.2, 0.01]), scale=np.array([0.3, 0.02]), known=np.array([3.0, 0.0]))
+    return Sizes(groups, deviation=np.array([0.2, 0.01]), scale=np.array([0.3, 0.02]))
 
 
 NAMES = ["geometry", "a1", "b2", "a2", "b1", "a3"]

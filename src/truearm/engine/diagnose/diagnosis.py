@@ -117,7 +117,7 @@ CHECKS: Final[tuple[Callable[[Case], Iterable[Notice]], ...]] = (
     lambda case: check_residual(case.left),
     _check_narrow,
     lambda case: case.of_split,
-    lambda case: _check_payload(case),
+    _check_payload,
     lambda case: case.few,
     lambda case: check_fit(case.fit, case.expected),
     lambda case: check_one_sided(case.fit, case.training),

@@ -25,6 +25,7 @@ from truearm.engine.fit.transmission import LARGEST_CHANCE, PeriodicError, lines
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.effects.balancing import Balancing
+from truearm.engine.robot.effects.effect import MATTERS
 from truearm.engine.robot.effects.linear_contact import LinearContactClearance
 from truearm.engine.robot.effects.transmission import TransmissionError
 from truearm.engine.robot.loads import has_weight
@@ -43,9 +44,7 @@ _HIGHEST: Final = 30
 _CHANCE: Final = 1.0
 #: How often they are looked for at most, each time in what the fit before left.
 _SEARCHES: Final = 2
-#: What an effect moves the targets by, a root mean square, from which it is counted [m].
-MATTERS: Final = 1e-6
-#: Likewise, from which it is said that an effect follows the order of the campaign [m].
+#: What an effect moves the targets by, a root mean square, from which it is said to follow the campaign's order [m].
 _WORTH_SAYING: Final = 5e-6
 
 

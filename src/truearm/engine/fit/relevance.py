@@ -78,7 +78,6 @@ class Sizes:
     deviation: Array = field(default_factory=lambda: np.zeros(0))
     #: What the deviations are expected to be about, in the same units; zero of a group that is not looked at yet.
     scale: Array = field(default_factory=lambda: np.zeros(0))
-    known: Array = field(default_factory=lambda: np.zeros(0))  #: How many of a group's parameters the data know.
 
     def __bool__(self) -> bool:
         return bool(self.groups)
@@ -123,7 +122,6 @@ class Sizes:
             near.before_curves if near else wait,
             deviation,
             scale,
-            np.zeros(len(groups)),
         )
 
     @cached_property
@@ -202,7 +200,7 @@ def with_sizes(
         deviation = np.where(gains[joint] < _SIGNIFICANT * crowd, _LEAST, deviation)
     moved = np.abs(np.log(deviation / sizes.deviation)) * np.minimum(known, 1.0)
     change = np.inf if first.any() or sizes.before_curves > -ROUNDS_OF_CURVES else float(np.max(moved, initial=0.0))
-    sizes = replace(sizes, deviation=deviation, known=known, before_curves=sizes.before_curves - 1)
+    sizes = replace(sizes, deviation=deviation, before_curves=sizes.before_curves - 1)
     current = {p.name: p for p in parameters}
     free = FreeParameters(tuple(sizes.sized(current[p.name]) for p in sizes.fitted(every).parameters))
     left = {p.name: p.nominal for p in problem.free.parameters if p.name not in set(free.names)}
@@ -265,7 +263,7 @@ def _climbed(
         on = np.flatnonzero(~gone[group])
         of, root = group[on], np.sqrt(variance)[group[on]]
         H = A[np.ix_(on, on)]
-        C = inverse_of(root[:, None] * H * root / noise + np.eye(len(root)))
+        C = _inverse(root[:, None] * H * root / noise + np.eye(len(root)))
         mean = C @ (root * b[on]) / noise
         w = root * mean
         known = np.asarray(np.bincount(of, 1.0 - np.diag(C), count))
@@ -371,7 +369,7 @@ def _factored(matrix: Array) -> Array:
         return np.asarray(np.linalg.qr(np.sqrt(np.maximum(sizes, 1.0))[:, None] * axes.T)[1].T)
 
 
-def inverse_of(matrix: Array) -> Array:
+def _inverse(matrix: Array) -> Array:
     """Return the inverse of a matrix that is not below 1, which rounding leaves between 0 and 1."""
     half = np.linalg.inv(_factored(matrix))
     return np.asarray(half.T @ half)
@@ -462,7 +460,7 @@ def _mean_squared_error(of: Moments, certain: NDArray[np.bool_], expected: Array
         informed: Share of the expected variance of each that the readings removed, ``(parameters,)``.
     """
     root = np.where(certain, 0.0, np.sqrt(expected))
-    C = inverse_of(root[:, None] * of.products[:-1, :-1] * root + np.eye(len(root)))
+    C = _inverse(root[:, None] * of.products[:-1, :-1] * root + np.eye(len(root)))
     mean = root * (C @ (root * of.products[:-1, -1]))
     off = np.where(certain, 0.0, of.away - mean)
     missing = np.outer(off, off)
@@ -474,8 +472,8 @@ def expected_sizes(sizes: Sizes, of: Moments, names: Sequence[str]) -> Array:
     """Return what the variance of each parameter is expected to be, by that of its prior now, ``(names,)``.
 
     It is the mean of what the data leave likely of each group's variance, those of the others as they are. Gears and
-    encoders do err, and few readings do not tell: curves are about as likely up to their prior, which falls as one by
-    the number of periods, or up to what they are in the joints whose readings tell.
+    encoders do err, and few readings do not tell: the mean square of a curve is believed to be that of its prior, which
+    falls as one by the number of periods, or what it is in the joints whose readings tell, and to be in few bands.
 
     Args:
         of: The equations at the solution, of parameters per prior.
@@ -484,7 +482,7 @@ def expected_sizes(sizes: Sizes, of: Moments, names: Sequence[str]) -> Array:
     expected = np.ones(len(names))
     if not sizes:
         return expected
-    C = inverse_of(of.products[:-1, :-1] + np.eye(len(names)))
+    C = _inverse(of.products[:-1, :-1] + np.eye(len(names)))
     mean = C @ of.products[:-1, -1]
     place = np.array([sizes.place.get(name, -1) for name in names])
     scale = np.maximum(sizes.scale, _LEAST)

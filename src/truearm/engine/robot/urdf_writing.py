@@ -16,7 +16,7 @@ from truearm.engine.base.units import mark_lines, written
 from truearm.engine.robot.chain import Array, Element
 from truearm.engine.robot.controller import Controller, JointsOf
 from truearm.engine.robot.effects.balancing import Balancing
-from truearm.engine.robot.effects.effect import Effect
+from truearm.engine.robot.effects.effect import MATTERS, Effect
 from truearm.engine.robot.parts import NO_PAYLOAD, Joint
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import Transform
@@ -24,9 +24,7 @@ from truearm.engine.robot.urdf_tree import Triple, product, roll_pitch_yaw
 
 #: Two frames less than this apart [m, rad] are the same to any instrument.
 _SAME_FRAME: Final = 1e-9
-#: What an effect moves the tip by, a root mean square, from which it is said to be left out [m], as where effects are
-#: identified; a tip that far from the flange; and joint positions at which that is looked at.
-_MATTERS: Final = 1e-6
+#: Where it is looked at whether an effect matters: a tip that far from the flange [m], at so many joint positions.
 _TIP: Final = 0.1
 _TRIED: Final = 50
 
@@ -67,7 +65,7 @@ def _matters(robot: Robot, effect: Effect) -> bool:
     without = robot.with_values({p.name: p.value for p in effect.parameters})
     place, turn = (with_it - bare for with_it, bare in zip(robot.world_poses(at), without.world_poses(at), strict=True))
     squares = np.sum(place**2, axis=1) + _TIP**2 * np.sum(turn**2, axis=(1, 2))
-    return bool(np.mean(squares) >= _MATTERS**2)
+    return bool(np.mean(squares) >= MATTERS**2)
 
 
 def masses_left_out(robot: Robot, format_: str) -> list[str]:

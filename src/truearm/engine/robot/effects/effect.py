@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from truearm.engine.robot.postures import Postures
 
 #: A derivative of the chain's variables: by parameter, and for each the variables it moves.
 Rates = Mapping[str, Mapping[int, Array]]
+#: What an effect moves the tip by, a root mean square, from which it is counted [m].
+MATTERS: Final = 1e-6
 
 
 @dataclass(frozen=True)

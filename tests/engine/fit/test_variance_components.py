@@ -71,7 +71,7 @@ def test_the_mean_of_visits_is_as_uncertain_as_student_says() -> None:
     readings = one_way(1.5)
     between, _ = mean_squares(readings)
     expected = np.sqrt(between / readings.size) * stdtrit(VISITS - 1, 0.975) / 1.959964
-    assert np.sqrt(components(readings).covariance[0, 0]) == pytest.approx(expected, rel=0.02)
+    assert np.sqrt(components(readings).worth[0][0, 0]) == pytest.approx(expected, rel=0.02)
 
 
 def test_visits_that_share_nothing_have_no_error_of_the_joints() -> None:
@@ -109,8 +109,8 @@ def test_priors_are_integrated_out() -> None:
     of_joints = (of_row[:, None] == of_row[None, :]) * ((G[:, :2] * best[2]) @ G[:, :2].T)
     V += of_joints + (of_row[:, None] == of_row[None, :]) * (best[3] * np.outer(G[:, 2], G[:, 2]))
     C = np.linalg.inv(A.T @ np.linalg.solve(V, A) + np.eye(6))
-    np.testing.assert_allclose(sum(part.covariance for part in estimate.parts), C, rtol=1e-6)
-    part = next(part for part in estimate.parts if part.joints == (0, 1))
+    np.testing.assert_allclose(sum(part.covariance for part in estimate.worth[1]), C, rtol=1e-6)
+    part = next(part for part in estimate.worth[1] if part.joints == (0, 1))
     pulled = np.linalg.solve(V, A @ C)
     np.testing.assert_allclose(part.covariance, pulled.T @ of_joints @ pulled, rtol=1e-6, atol=1e-9)
     assert part.freedom == estimate.likeliest.freedom[0] < 2 * len(set(of_row.tolist()))

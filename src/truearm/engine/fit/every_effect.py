@@ -151,14 +151,15 @@ def identify_every_effect(
         bounds_file=bounds_file,
         fixed=fixed,
     )
-    solved = find(robot, model=every_effect(robot, data))
+    solved = find(robot, model=every_effect(robot, data), rough=True)
     for _ in range(_SEARCHES):
         more = _lines_left(solved)
         if not more:
             break
         lines, robot = (*lines, *more), with_lines(robot, more)
         progress("identifying errors that repeat with the joints' angles")
-        solved = find(with_lines(solved.start, more), model=every_effect(robot, data), near=solved)
+        solved = find(with_lines(solved.start, more), model=every_effect(robot, data), near=solved, rough=True)
+    solved = find(solved.start, model=every_effect(robot, data), near=solved)
     draws = refit_draws(solved, loss, bootstrap, seed, progress) if bootstrap else None
     fit = fit_of(solved, every_effect(robot, data), loss, draws)
     return robot, fit, _shares(robot, fit, data, lines)

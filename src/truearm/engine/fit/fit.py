@@ -398,7 +398,7 @@ def _worth(
     problem, solution, limits, components = solved.problem, solved.solution, solved.limits, solved.components
     free, x = problem.free, solution.vector
     if components is not None and not scattered and draws is None:
-        covariance, parts = components.covariance, components.parts
+        covariance, parts = components.worth
     else:
         covariance, parts = cluster_covariance(
             lambda: _pulled(problem, solution, loss),

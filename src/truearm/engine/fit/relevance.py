@@ -17,7 +17,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.fit.likelihood import Visits, Whitening
+from truearm.engine.fit.likelihood import Visits, Whitening, lower_inverse
 from truearm.engine.fit.problem import NOISE_FLOOR, Problem
 from truearm.engine.fit.variance_components import CovariancePart
 from truearm.engine.robot.chain import Array
@@ -40,7 +40,7 @@ _SCALE: Final = 0.3
 _SPARSE: Final = 2.0
 #: Information of the readings on a group that is none, and what its variance is then multiplied by in a step.
 _NOTHING: Final = 0.02
-_FADING: Final = 0.3
+_FADING: Final = 0.03
 #: Deviation from which a group starts again, at least, by what it is expected to be about.
 _AGAIN: Final = 0.1
 #: Deviation of a group by the prior of its parameters: at least and at most. A curve may be of 0.1 rad.
@@ -54,10 +54,8 @@ _SETTLED: Final = 0.02
 #: First periods in a turn of the bands of a curve. A gear makes a few lines: a wide band would shrink them with the
 #: rest, and few readings do not tell narrow ones.
 BANDS: Final = (1, *range(3, HIGHEST, 3))
-#: Rounds before curves join in, where other effects have sizes too, and how often all their bands are looked at: the
-#: noise that is left without a curve is not that with it.
+#: Rounds before curves join in, where other effects have sizes too.
 _BEFORE_CURVES: Final = 2
-ROUNDS_OF_CURVES: Final = 2
 #: Deviation of readings in sums of products at least [m, rad]: of smaller ones rounding is larger than what the priors
 #: know.
 _SUMMED_FLOOR: Final = 1e-7
@@ -73,7 +71,7 @@ class Sizes:
     groups: Mapping[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict)
     priors: Mapping[str, float] = field(default_factory=dict)  #: Of these parameters, beforehand [SI].
     curves: Mapping[str, int] = field(default_factory=dict)  #: Joint (from 0) of each coefficient of curves.
-    before_curves: int = 0  #: Rounds until curves join in; below zero those since then.
+    before_curves: int = 0  #: Rounds until curves join in; below zero when they have.
     #: Deviation of each group by the prior of its parameters, in the order of `groups`.
     deviation: Array = field(default_factory=lambda: np.zeros(0))
     #: What the deviations are expected to be about, in the same units; zero of a group that is not looked at yet.
@@ -110,7 +108,7 @@ class Sizes:
                 groups.setdefault((p.group, p.unit, joint), []).append(p)
         graded = [p for members in groups.values() for p in members]
         curves = {p.name: curve[p.name][0] for p in graded if p.name in curve}
-        wait = (_BEFORE_CURVES if every else 0) if curves else -ROUNDS_OF_CURVES
+        wait = (_BEFORE_CURVES if every else 0) if curves else -1
         begin = {key: (_LEAST if key[0] == JointCurve.name else 1.0, 0.0) for key in groups}
         if near is not None:
             begin |= dict(zip(near.groups, zip(near.deviation, near.scale, strict=True), strict=True))
@@ -130,10 +128,9 @@ class Sizes:
         return {name: k for k, names in enumerate(self.groups.values()) for name in names}
 
     def fitted(self, every: FreeParameters) -> FreeParameters:
-        """Return the parameters that are fitted: all but those of groups that shrank to nothing."""
-        return FreeParameters(
-            tuple(p for p in every.parameters if p.name not in self.place or self._deviation_of(p) > _LEAST)
-        )
+        """Return the parameters that are fitted: all but those of groups that shrank to nothing, each with its size."""
+        fitted = (p for p in every.parameters if p.name not in self.place or self._deviation_of(p) > _LEAST)
+        return FreeParameters(tuple(self.sized(p) for p in fitted))
 
     def sized(self, parameter: Parameter) -> Parameter:
         """Return a parameter with the deviation of its group as its prior."""
@@ -163,7 +160,7 @@ def with_sizes(
         problem, sizes, change: The largest relative change of a deviation that matters.
         joints: Their variances with the effects.
     """
-    looking = -ROUNDS_OF_CURVES < sizes.before_curves <= 0  # at all bands of the curves
+    looking = sizes.before_curves == 0  # at all bands of the curves
     fitted = set(problem.free.names)
     aside = [
         problem.robot.parameters[name]
@@ -199,10 +196,10 @@ def with_sizes(
         gains = np.array([gain(joint == j) if j else np.inf for j in range(int(joint.max(initial=0)) + 1)])
         deviation = np.where(gains[joint] < _SIGNIFICANT * crowd, _LEAST, deviation)
     moved = np.abs(np.log(deviation / sizes.deviation)) * np.minimum(known, 1.0)
-    change = np.inf if first.any() or sizes.before_curves > -ROUNDS_OF_CURVES else float(np.max(moved, initial=0.0))
+    change = np.inf if first.any() or sizes.before_curves >= 0 else float(np.max(moved, initial=0.0))
     sizes = replace(sizes, deviation=deviation, before_curves=sizes.before_curves - 1)
     current = {p.name: p for p in parameters}
-    free = FreeParameters(tuple(sizes.sized(current[p.name]) for p in sizes.fitted(every).parameters))
+    free = sizes.fitted(FreeParameters(tuple(current.get(p.name, p) for p in every.parameters)))
     left = {p.name: p.nominal for p in problem.free.parameters if p.name not in set(free.names)}
     factor = max(min(1.0, float(np.sqrt(noise))), NOISE_FLOOR / min(problem.noise.values()))
     weighed = replace(
@@ -371,7 +368,7 @@ def _factored(matrix: Array) -> Array:
 
 def _inverse(matrix: Array) -> Array:
     """Return the inverse of a matrix that is not below 1, which rounding leaves between 0 and 1."""
-    half = np.linalg.inv(_factored(matrix))
+    half = lower_inverse(_factored(matrix))
     return np.asarray(half.T @ half)
 
 

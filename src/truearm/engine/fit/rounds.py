@@ -31,7 +31,7 @@ from truearm.engine.fit.problem import (
     find_redundancies,
     gauge_freedoms,
 )
-from truearm.engine.fit.relevance import NO_SIZES, ROUNDS_OF_CURVES, Sizes, with_sizes
+from truearm.engine.fit.relevance import NO_SIZES, Sizes, with_sizes
 from truearm.engine.fit.solver import SMALL, Solution, solve
 from truearm.engine.fit.start_values import start_from_readings, unanchored
 from truearm.engine.fit.variance_components import Components, CovariancePart, beyond_chance, variance_components
@@ -61,9 +61,13 @@ _UNSEEN: Final = 1e-3
 #: Relative change of the size of an effect that changes nothing, and the last step of solutions meanwhile [priors].
 _SIZES_SETTLED: Final = 0.1
 _COARSE: Final = 0.01
+#: No joint errs by so much from visit to visit [rad or m], a tenth of a degree: it is an effect.
+_NO_JOINT: Final = 1.7e-3
 #: Coordinates that say where a target is.
 _COORDINATES: Final = 3
-_LOADS_AGREE: Final = 1e-4  # of the last step, in the joints' deflections [rad or m]
+#: By how much joints may bend otherwise under other loads, while sizes are found and at last [rad or m].
+_LOADS_ARE_NEAR: Final = 1e-6
+_LOADS_AGREE: Final = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +107,7 @@ def find_parameters(
     small: float = SMALL,
     shared: bool = True,
     near: Solved | None = None,
+    rough: bool = False,
 ) -> Solved:
     """Find the free parameters of a robot from training data.
 
@@ -111,7 +116,9 @@ def find_parameters(
     Args:
         shared: Whether errors of the joints that the readings of a visit share are looked for, with the linear loss.
         near: A solution from the same data, of a robot that is the same but for further parameters of effects. The
-            search begins at its values and variances. The robot given is its start with those.
+            search begins at its values and variances. The robot given is its start with those. Without further ones
+            the sizes of effects stay as they are.
+        rough: Whether to end when the sizes of effects are found, a hundredth of a prior from the solution.
     """
     robot = robot.marked(data.simulated)
     start = start_from_readings(model.prepared(robot), data, fixed) if near is None else model.prepared(robot)
@@ -121,10 +128,8 @@ def find_parameters(
         free = free.without([SCALE])
     check_bounds = _checked(model, start, free, data.source, redundancy, fixed, bounds, bounds_file)
     problem = Problem(start, data, free, dict(_FIRST_NOISE), priors=redundancy == "prior")
-    joints = None
     if near is not None:
         problem = _begun_at(problem, near)
-        joints = None if near.components is None else near.components.weighing.joints
     check_solvable(problem)
     dropped: tuple[Redundancy, ...] = ()
     if redundancy == "drop":
@@ -142,9 +147,9 @@ def find_parameters(
             limits,
             small,
             shared=shared and redundancy != "none",
-            joints=joints,
             weighed=model.weighed,
-            near=None if near is None else near.sizes,
+            near=near,
+            rough=rough,
         )
         steps += solution.steps
         if redundancy != "drop":
@@ -285,9 +290,9 @@ def _solve_with_noise(
     small: float,
     *,
     shared: bool,
-    joints: Array | None = None,
-    weighed: bool = False,
-    near: Sizes | None = None,
+    weighed: bool,
+    near: Solved | None,
+    rough: bool,
 ) -> tuple[Solution, Problem, Components | None, Sizes]:
     """Solve; then again with what the solution says of deviations, of the sizes of effects and of the loads.
 
@@ -299,7 +304,7 @@ def _solve_with_noise(
     untold: frozenset[str] = frozenset()
     while True:
         result = _solve_in_rounds(
-            problem, loss, limits, small, shared=shared, joints=joints, untold=untold, weighed=weighed, near=near
+            problem, loss, limits, small, shared=shared, untold=untold, weighed=weighed, near=near, rough=rough
         )
         more = _untold(result[1], result[2]) - untold
         if not more:
@@ -335,33 +340,39 @@ def _solve_in_rounds(
     small: float,
     *,
     shared: bool,
-    joints: Array | None,
     untold: frozenset[str],
     weighed: bool,
-    near: Sizes | None,
+    near: Solved | None,
+    rough: bool,
 ) -> tuple[Solution, Problem, Components | None, Sizes]:
     """Solve in rounds, with the deviations of what is `untold` as they are."""
     every, within = problem, limits
-    sizes = Sizes.of(problem, every=weighed, near=near)
-    if sizes.curves:
+    sizes = Sizes.of(problem, every=weighed, near=None if near is None else near.sizes)
+    known = near is not None and sizes.place.keys() == near.sizes.place.keys()
+    if sizes:
         problem = replace(problem, free=sizes.fitted(problem.free))
         limits = _within(within, every.free, problem.free)
-    joints = np.zeros(len(problem.robot.joints)) if joints is None else joints
-    step = _COARSE if sizes else small
+    before = None if near is None else near.components
+    joints = np.zeros(len(problem.robot.joints)) if before is None else before.weighing.joints
+    looking = bool(sizes) and not known  # at how large the effects are; from then on their sizes stay as they are
+    step = _COARSE if looking or rough else small
     solution = solve_with_joints(problem, joints, loss, limits, step)
     steps = solution.steps
-    components = None
-    most = _ROUNDS + (_ROUNDS + ROUNDS_OF_CURVES if sizes else 0)
+    components, hidden = before if known else None, False
+    most = _ROUNDS + (_ROUNDS if sizes else 0)
     for number in range(most):
         if loss == "linear" and shared:
             components = estimated_components(problem, solution, limits, components, untold, each=weighed)
+            hidden = looking and number == 0 and bool(np.any(components.weighing.joints > _NO_JOINT**2))
+            if hidden:  # what effects do that have no size yet
+                components = estimated_components(problem, solution, limits, untold=untold, joints=False)
             next_problem, change, joints = _with_components(problem, components, joints)
         else:
             next_problem, change = _with_scale(problem, solution, loss)
         values = dict(zip(problem.free.names, map(float, solution.vector), strict=True))
         started = FreeParameters(tuple(replace(p, value=values[p.name]) for p in problem.free.parameters))
         next_problem = replace(next_problem, robot=problem.robot.with_values(values), free=started)
-        if step > small:
+        if looking:
             hold = components is not None and components.holds and joints.any()
             crowd = 1.0 if hold else max(1.0, problem.rows / (_COORDINATES * len(np.unique(problem.visits))))
             next_problem, sizes, more, joints = with_sizes(
@@ -369,14 +380,16 @@ def _solve_in_rounds(
             )
             limits = _within(within, every.free, next_problem.free)
             change = max(change, more * _SETTLED / _SIZES_SETTLED)
-        if change < _SETTLED and _load_shift(problem, next_problem) < _LOADS_AGREE * step:
-            if step == small:
+        agree = _LOADS_ARE_NEAR if looking else _LOADS_AGREE
+        if change < _SETTLED and _load_shift(problem, next_problem) < agree:
+            if rough or not looking:
                 break
-            step = small  # from here on sizes stay as they are
-        if len(next_problem.free.names) > len(problem.free.names):
+            looking, step = False, small
+        if hidden or len(next_problem.free.names) > len(problem.free.names):
             components = None  # with curves it is asked again whether the joints err
         problem = next_problem
-        step = small if number == most - _ROUNDS else step
+        if number == most - _ROUNDS:
+            looking, step = False, _COARSE if rough else small
         solution = solve_with_joints(problem, joints, loss, limits, step)
         steps += solution.steps
     return replace(solution, steps=steps), problem, components, sizes
@@ -416,10 +429,12 @@ def estimated_components(
     untold: frozenset[str] = frozenset(),
     *,
     each: bool = False,
+    joints: bool = True,
 ) -> Components:
     """Estimate the variances of readings and joints at a solution, those of :func:`factors_of` and of joints.
 
-    Joints of a kind are alike, or `each` is by itself, where every effect is in the model.
+    Joints of a kind are alike, or `each` is by itself, where every effect is in the model. Or no joint errs, without
+    `joints`.
 
     Declared deviations are widened if residuals are larger than chance allows (1 in 1000), or were before. Variances
     that are `untold` stay as they are.
@@ -444,6 +459,7 @@ def estimated_components(
     alike = [np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())]
     if each:
         alike = [np.array([i]) for i in range(len(kinds))]
+    alike = alike if joints else []
     free = [name not in (DECLARED, SETUP, *untold) for name in names]
     least = np.array(
         [(NOISE_FLOOR / problem.noise[n]) ** 2 if f else _LEAST_WIDENED for f, n in zip(free, names, strict=True)]
@@ -457,8 +473,13 @@ def estimated_components(
             if beyond_chance(float(components.squares[place]), max(float(components.freedom[place]), 1e-3)):
                 free[place] = True
                 components = variance_components(at, free, least, alike)
-    covariance = CovariancePart(components.covariance, np.inf).among(uncertain).covariance
-    return replace(components, covariance=covariance, parts=tuple(part.among(uncertain) for part in components.parts))
+
+    def worth() -> tuple[Array, tuple[CovariancePart, ...]]:
+        covariance, parts = components.worth
+        whole = CovariancePart(covariance, np.inf).among(uncertain).covariance
+        return whole, tuple(part.among(uncertain) for part in parts)
+
+    return replace(components, found_worth=worth)
 
 
 def factors_of(problem: Problem) -> tuple[list[str], NDArray[np.intp]]:

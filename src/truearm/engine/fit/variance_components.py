@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.engine.fit.likelihood import Likelihood, Linearised, Moments, Visits, Whitening
+from truearm.engine.fit.likelihood import Likelihood, Linearised, Moments, Visits, Whitening, lower_inverse
 from truearm.engine.fit.problem import Rows
 from truearm.engine.robot.chain import Array
 
@@ -83,13 +83,20 @@ class Components:
     weighing: Variances
     estimated: tuple[bool, ...]  #: Whether the variance of each factor was.
     holds: bool  #: Whether the residuals look as they do with the variances that readings are weighed by.
-    #: Of the parameters, per prior, ``(parameters, parameters)``, with the uncertainty of these variances.
-    covariance: Array
-    parts: tuple[CovariancePart, ...]  #: The same by its sources, and without that uncertainty: per prior too.
+    #: What gives :attr:`worth`, when that is asked for.
+    found_worth: Callable[[], tuple[Array, tuple[CovariancePart, ...]]]
     #: squares, freedom: sum of the squared residuals of each factor, divided by these variances, and what to expect of
     #: it, ``(factors,)``.
     squares: Array
     freedom: Array
+
+    @cached_property
+    def worth(self) -> tuple[Array, tuple[CovariancePart, ...]]:
+        """Covariance of the parameters, per prior, and its parts.
+
+        The first, ``(parameters, parameters)``, has the uncertainty of the variances; its parts, by sources, have not.
+        """
+        return self.found_worth()
 
 
 def variance_components(
@@ -135,10 +142,10 @@ def variance_components(
             likeliest = replace(before.likeliest, factors=factors)
     taken = [kind for kind in kinds if best.joints[kind].any()]
     squares, traces, _ = best.slopes(range(len(estimated)))
-    covariance, parts = _covariance(best, taken, noise)
     weighing = likeliest if holds else _variances(best, kinds, noise)
+    worth = partial(_covariance, best, taken, noise)
     return Components(
-        likeliest, weighing, tuple(estimated), holds, covariance, parts, squares * best.factors, traces * best.factors
+        likeliest, weighing, tuple(estimated), holds, worth, squares * best.factors, traces * best.factors
     )
 
 
@@ -207,7 +214,7 @@ def _covariance(
     ``C A' V^-1 V_i V^-1 A C`` is the part of each, and what is left is of the priors.
     """
     directions = state.of.at.directions
-    inverse = np.asarray(np.linalg.solve(state.L, np.eye(len(state.L))), dtype=np.float64)
+    inverse = lower_inverse(state.L)
     turned = directions @ inverse.T
     unseen = state.of.at.unseen @ state.of.at.unseen.T
     kinds: list[NDArray[np.intp] | int] = [*taken, *noise]
@@ -408,6 +415,8 @@ _LARGEST_SHARE: Final = 0.999
 #: Share of the prior variance that the data should remove for a parameter to count in the degrees of freedom.
 _INFORMED: Final = 0.5
 _LEAST_FREEDOM: Final = 1.0
+#: Of how many of them it is taken: each costs a product of all directions.
+_MOST_ASKED: Final = 60
 #: Numbers that are in memory at once, of the visits' shares and of their products.
 _MOST_STORED: Final = 16_000_000
 
@@ -507,6 +516,7 @@ def _meat(scatter: _Scatter, known_before: bool) -> tuple[Array, float]:
         informed = 1.0 - np.sum(directions**2, axis=1) > _INFORMED
         informed = informed if informed.any() else ~informed
     asked = directions[informed]
+    asked = asked[:: -(-len(asked) // _MOST_ASKED)]
     meat = np.zeros((count, count))
     # Of each parameter, over the visits: variance of its shares, their squares, what they have in common.
     total, squares, mixed, spent = np.zeros((4, len(asked)))

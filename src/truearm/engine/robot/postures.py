@@ -47,6 +47,11 @@ class Postures:
         """Return plain joint positions ``(n, joints)`` as postures at rest."""
         return q if isinstance(q, Postures) else cls(np.asarray(q, float))
 
+    def circumstances(self) -> tuple[bytes | None, ...]:
+        """Return all that loads are found from, to compare: equal where the loads of a robot are the same."""
+        whole = (self.joints, self.velocity, self.acceleration, self.approach, self.number, self.temperature)
+        return tuple(None if part is None else part.tobytes() for part in (*whole, self.wrench))
+
     @property
     def joint_loads(self) -> Array:
         """The loads, of postures that have them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from numbers import Integral
 from typing import TYPE_CHECKING, Final
 
@@ -29,6 +30,10 @@ if TYPE_CHECKING:
 
 
 Values = Mapping[str, float | Array]
+
+#: How many postures' loads a robot keeps for whoever asks next: so many times, of so many configurations at most.
+_KEPT: Final = 4
+_KEPT_POSTURES: Final = 2000
 
 
 @dataclass(frozen=True, repr=False)
@@ -220,7 +225,19 @@ class Robot(RobotData):
         fallen = at.fall is not None or not any(effect.falls for effect in self.effects)
         if (at.loads is not None and fallen) or not self.bends:
             return at
-        return postures_in_equilibrium(self, at)
+        if len(at.joints) > _KEPT_POSTURES:
+            return postures_in_equilibrium(self, at)
+        key, kept = at.circumstances(), self._in_equilibrium
+        if key not in kept:
+            if len(kept) >= _KEPT:
+                del kept[next(iter(kept))]
+            kept[key] = postures_in_equilibrium(self, at)
+        return replace(at, loads=kept[key].loads, fall=kept[key].fall, relief=kept[key].relief)
+
+    @cached_property
+    def _in_equilibrium(self) -> dict[tuple[bytes | None, ...], Postures]:
+        """Postures that loads were asked for last: in one calibration it is a dozen times for the same."""
+        return {}
 
     def variables(self, q: Array | Postures, values: Values) -> Array:
         """Return the variables ``(joints or more, ..., n)`` of the trunk behind the joint positions `q`.

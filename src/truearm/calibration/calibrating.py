@@ -51,6 +51,7 @@ from truearm.engine.diagnose.simulated_calibrations import (
     refuse_too_many,
     simulated_calibrations,
 )
+from truearm.engine.diagnose.unseen import as_unseen_shows
 from truearm.engine.fit.bounds import Bounds, read_bounds
 from truearm.engine.fit.every_effect import (
     AUTO,
@@ -250,6 +251,8 @@ def calibrated(asked: Calibrate) -> Calibration:
     with refusals_of("data"):
         parts = _split(asked, read)
         solved = _identified(asked, read, parts)
+    if parts.second is not None:
+        solved = replace(solved, fit=as_unseen_shows(solved.fit, parts.second))
     calibration = replace(_judged(asked, read, parts, solved), inputs=inputs)
     if asked.out is not None:
         calibration.save(asked.out, asked.progress, replace=asked.replace)

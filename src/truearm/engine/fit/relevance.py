@@ -387,10 +387,10 @@ _LARGER: Final = 3.0
 _ERRING: Final = 0.1
 #: Share of the variance of the readings that all coefficients of curves which are left out may move them by together.
 _NEGLIGIBLE: Final = 1e-3
-#: Degrees of freedom of the level of the errors: variances of groups are known from a few dozen parameters, and what
-#: errs more than 60 times in a turn is in none of them. With so many the interval of the expected error holds about as
-#: often as it says on twins (docs/benchmarks.md); targets of programs have as many.
-_FREEDOM: Final = 12.0
+#: Degrees of freedom of the level of the errors, before readings that the fit has not seen tell it
+#: (:mod:`truearm.engine.diagnose.unseen`): variances of groups are found from the readings that the parameters are
+#: found from, and what errs more than 60 times in a turn is in none of them.
+_FREEDOM: Final = 5.0
 
 
 def parts_with_sizes(

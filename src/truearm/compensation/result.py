@@ -205,14 +205,14 @@ class FileCorrection(Record):
         low, high = self.intervals[1]
         (mean, most), (mean_now, most_now) = ((v.mean() * 1e3, v.max() * 1e3) for v in self.expected)
         interval = f" now (90 %: {low * 1e3:.3f} to {high * 1e3:.3f})"
-        least = "at least " if self.lower_bound else ""
+        about = "about " if self.lower_bound else ""
         if self.lower_bound:
             interval = f" now (90 %: {low * 1e3:.3f} or more)"
         elif mean_now < 1.01e3 * REPEATABILITY:
             interval = " or more now (no robot repeats better)"
         return (
             f"{self.name}  {self.language}: {'relative ' * self.relative}error to expect {mean:.3f} mm before, "
-            f"{least}{mean_now:.3f} mm{interval}; largest expected, not a bound: {most:.3f} and {most_now:.3f} mm"
+            f"{about}{mean_now:.3f} mm{interval}; largest expected, not a bound: {most:.3f} and {most_now:.3f} mm"
         )
 
     @property

@@ -84,9 +84,10 @@ def check_payload_read(left: LeftOver) -> list[Notice]:
     stated = f"{payload.mass:g} kg" if payload.mass else "none"
     return [
         PAYLOAD_UNLIKELY(
-            f"The readings look like {mass} on the flange instead of {stated}: with that, joints that give way leave "
-            f"{1.0 - found.left:.0%} less. Other effects make up for it here, and predictions with another payload "
-            "will be wrong. Check what the robot carried (`payload`) and the masses in the robot file."
+            f"Either the payload is wrong or masses in the robot file are: the readings look like {mass} on the flange "
+            f"instead of {stated}. With that, joints that give way leave {1.0 - found.left:.0%} less. Other effects "
+            "make up for it here, and predictions with another payload will be wrong. Check what the robot carried "
+            "(`payload`), then the masses."
         )
     ]
 

@@ -330,7 +330,7 @@ def _more(case: Case, notices: Sequence[Notice], known: float) -> list[NextStep]
         over = case.expected.overall.mean - expected_where_measured(fit, case.training)
         words = _where_to_measure(case, "know the whole workspace as well as where was measured")
         return [NextStep("measure-more", f"{words} The gain is over the workspace.", max(over, 0.0))]
-    gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else _LENGTH * (before - after)
+    gain = None if narrow and 1.0 - after / before < _LEAST_GAIN else known * (1.0 - after / before)
     held_out = case.left.problem.data.configurations - n
     train = " Or train on more of them: `train`." if held_out >= n else ""
     words = _where_to_measure(case, f"halve what {n} leave uncertain, as {n} more would")

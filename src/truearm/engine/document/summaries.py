@@ -254,7 +254,7 @@ def expected_blocks(expected: ExpectedError) -> Iterator[Block]:
     )
     places = max(3, -math.floor(math.log10(max(mean, 1e-6))) + 1)
     if expected.lower_bound:
-        figures = f"at least {mean:.{places}f} mm (90 %: {low:.{places}f} or more), 95 % {p95:.{places}f} mm or more"
+        figures = f"about {mean:.{places}f} mm (90 %: {low:.{places}f} or more), 95 % about {p95:.{places}f} mm"
     else:
         figures = f"{mean:.{places}f} mm (90 %: {low:.{places}f} to {high:.{places}f}), 95 % below {p95:.{places}f} mm"
     yield say(

@@ -401,10 +401,10 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
             fit,
             parts.readings,
             first,
+            second,
             validation or train_errors,
             tuple(parts.noticed),
             of_split,
-            held_out=second is not None,
         )
     )
     simulated, notices = None, list[Notice]()

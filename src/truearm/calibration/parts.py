@@ -19,8 +19,9 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors
 from truearm.engine.diagnose.curves import FittedCurve
 from truearm.engine.diagnose.error_budget import ErrorBudget, Share
-from truearm.engine.diagnose.expected_error import ExpectedError, covariance_root, uncertain_names
+from truearm.engine.diagnose.expected_error import ExpectedError
 from truearm.engine.diagnose.gain import NO_GAIN
+from truearm.engine.diagnose.position_errors import covariance_root, uncertain_names
 from truearm.engine.diagnose.simulated_calibrations import PredictedError, SimulatedCalibrations
 from truearm.engine.document.document import Block, detail, say
 from truearm.engine.document.records import Record

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.diagnose.expected_error import covariance_root, uncertain_names
+from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.diagnose.position_errors import covariance_root, uncertain_names
 from truearm.engine.diagnose.unseen import as_unseen_shows
 from truearm.engine.fit.every_effect import identify_every_effect
 from truearm.engine.fit.fit import Fit, identify
@@ -59,16 +61,29 @@ def test_parameters_are_as_uncertain_as_unseen_readings_show() -> None:
     assert 4.0 < levels[3.0] < 14.0
 
 
-def test_what_unseen_readings_told_is_known_better() -> None:
+def test_deviations_of_parameters_follow() -> None:
     _, fit = campaign()
-    shown = as_unseen_shows(fit, read(1.0, 0))
-    for before, after in zip(fit.covariance_parts, shown.covariance_parts, strict=True):
-        assert before.freedom < after.freedom <= 50.0
-    times = shown.covariance[0, 0] / fit.covariance[0, 0]
+    shown = as_unseen_shows(fit, read(3.0, 0))
     name = fit.free.names[0]
     before, after = (one.robot.parameters[name].deviation for one in (fit, shown))
     assert before is not None
-    assert after == pytest.approx(times**0.5 * before)
+    assert after == pytest.approx((shown.covariance[0, 0] / fit.covariance[0, 0]) ** 0.5 * before)
+    assert shown.robot.values == fit.robot.values
+
+
+@pytest.mark.parametrize("times", [0.5, 1.0, 2.0])
+def test_draws_that_contradict_unseen_readings_do_not_count(times: float) -> None:
+    _, fit = campaign()
+    wide, narrow = [], []
+    for seed in range(5):
+        unseen = read(times, seed)
+        shown = as_unseen_shows(fit, unseen)
+        wide.append(expected_error(shown).overall)
+        narrow.append(expected_error(shown, unseen=unseen).overall)
+    for all_draws, agreeing in zip(wide, narrow, strict=True):
+        assert np.diff(agreeing.interval_90) < 0.9 * np.diff(all_draws.interval_90)
+    off = [np.median(errors_of(fit.robot, read(times, seed)).position_norms) for seed in range(5)]
+    assert np.corrcoef(off, [of.mean for of in narrow])[0, 1] > 0.8
 
 
 def test_a_few_wrong_readings_say_nothing() -> None:
@@ -92,4 +107,5 @@ def test_noise_alone_says_nothing() -> None:
     noisy = replace(unseen, position=unseen.position + 1e-3 * np.random.default_rng(1).standard_normal((60, 3)))
     shown = as_unseen_shows(coarse, noisy)
     assert shown.covariance[0, 0] == pytest.approx(coarse.covariance[0, 0], rel=0.2)
-    assert shown.covariance_parts[0].freedom == pytest.approx(coarse.covariance_parts[0].freedom, rel=0.2)
+    all_draws, agreeing = (expected_error(shown, unseen=one).overall.interval_90 for one in (None, noisy))
+    assert agreeing == pytest.approx(all_draws, rel=0.15)

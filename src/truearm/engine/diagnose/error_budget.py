@@ -26,8 +26,9 @@ import numpy as np
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS, Position
 from truearm.engine.data.statistics import TableMotion, table_motion
-from truearm.engine.diagnose.expected_error import ExpectedError, PositionErrors, covariance_root, uncertain_names
+from truearm.engine.diagnose.expected_error import ExpectedError
 from truearm.engine.diagnose.gain import repeatability
+from truearm.engine.diagnose.position_errors import PositionErrors, covariance_root, uncertain_names
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.likelihood import Visits, Whitening
 from truearm.engine.fit.problem import Problem

@@ -23,7 +23,7 @@ from truearm.engine.base.errors import Notice, Rule, listed
 from truearm.engine.base.limits import limit, refuse_beyond
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
-from truearm.engine.diagnose.expected_error import PositionErrors, moved_lengths
+from truearm.engine.diagnose.position_errors import PositionErrors, moved_lengths
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.likelihood import Visits, Whitening
 from truearm.engine.fit.models import Model

@@ -20,7 +20,8 @@ import numpy as np
 
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.diagnose.curves import fitted_curves
-from truearm.engine.diagnose.expected_error import as_residuals_allow, expected_error
+from truearm.engine.diagnose.expected_error import expected_error
+from truearm.engine.diagnose.position_errors import as_residuals_allow
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array

@@ -22,8 +22,9 @@ import numpy as np
 from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.expected_error import as_residuals_allow, expected_error
+from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.diagnose.narrow_data import check_narrow_data
+from truearm.engine.diagnose.position_errors import as_residuals_allow
 from truearm.engine.fit.fit import Status, identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.library import load_robot

@@ -51,7 +51,7 @@ from truearm.engine.diagnose.simulated_calibrations import (
     refuse_too_many,
     simulated_calibrations,
 )
-from truearm.engine.diagnose.unseen import as_unseen_shows
+from truearm.engine.diagnose.unseen import Unseen
 from truearm.engine.fit.bounds import Bounds, read_bounds
 from truearm.engine.fit.every_effect import (
     AUTO,
@@ -251,8 +251,6 @@ def calibrated(asked: Calibrate) -> Calibration:
     with refusals_of("data"):
         parts = _split(asked, read)
         solved = _identified(asked, read, parts)
-    if parts.second is not None:
-        solved = replace(solved, fit=as_unseen_shows(solved.fit, parts.second))
     calibration = replace(_judged(asked, read, parts, solved), inputs=inputs)
     if asked.out is not None:
         calibration.save(asked.out, asked.progress, replace=asked.replace)
@@ -373,6 +371,8 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
     """Judge what was identified by the part that it has not seen."""
     asked.progress("judging it")
     fit, first, second = solved.fit, parts.first, parts.second
+    unseen = None if second is None else Unseen.of(fit, second, first)
+    fit = fit if unseen is None else unseen.as_shown(fit)
     validation = None if second is None else errors_of(fit.robot, second)
     train_errors = errors_of(fit.robot, first)
     of_split = (
@@ -401,10 +401,11 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
             fit,
             parts.readings,
             first,
-            second,
+            unseen,
             validation or train_errors,
             tuple(parts.noticed),
             of_split,
+            held_out=second is not None,
         )
     )
     simulated, notices = None, list[Notice]()

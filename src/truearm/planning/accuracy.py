@@ -283,11 +283,12 @@ def sensitivity_of_readings(robot: Robot, data: Dataset, free: FreeParameters, n
 
 
 def check_known(robot: Robot, postures: Postures) -> None:
-    """Refuse a robot that nobody sees, and effects that need to know what no plan knows."""
+    """Refuse a robot that nobody sees, and effects of any size that need to know what no plan knows."""
     if not robot.targets:
         raise InputError("the robot has no targets, so nothing can be measured", where=robot.name)
     for effect in robot.effects:
-        if effect.warmed and postures.temperature is None:
+        grows = any(robot.values[parameter.name] != 0.0 for parameter in effect.parameters)
+        if effect.warmed and grows and postures.temperature is None:
             raise InputError(
                 f"the effect {effect.name} needs the temperature of the arm, which a plan does not have",
                 where=robot.name,

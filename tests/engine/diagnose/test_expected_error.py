@@ -18,13 +18,8 @@ from truearm.calibration.calibrate import calibrate
 from truearm.calibration.result import Calibration
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.expected_error import (
-    as_residuals_allow,
-    error_by_order,
-    expected_error,
-    expected_map,
-    moved_by_order,
-)
+from truearm.engine.diagnose.expected_error import error_by_order, expected_error, expected_map, moved_by_order
+from truearm.engine.diagnose.position_errors import as_residuals_allow
 from truearm.engine.fit.fit import Fit, Status, identify
 from truearm.engine.fit.models import FRAMES, MODELS, Model
 from truearm.engine.fit.variance_components import CovariancePart

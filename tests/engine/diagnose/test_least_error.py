@@ -13,9 +13,9 @@ from tests.expecting import known
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, errors_of
-from truearm.engine.diagnose.expected_error import as_residuals_allow
 from truearm.engine.diagnose.gain import mean_length
 from truearm.engine.diagnose.least_error import Kind, LeastError, least_errors
+from truearm.engine.diagnose.position_errors import as_residuals_allow
 from truearm.engine.document.summaries import error_line, least_words
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.losses import Loss

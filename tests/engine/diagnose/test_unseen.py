@@ -12,7 +12,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.diagnose.expected_error import expected_error
 from truearm.engine.diagnose.position_errors import covariance_root, uncertain_names
-from truearm.engine.diagnose.unseen import as_unseen_shows
+from truearm.engine.diagnose.unseen import Unseen
 from truearm.engine.fit.every_effect import identify_every_effect
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import named_model
@@ -47,11 +47,25 @@ def read(times: float, seed: int) -> Dataset:
     return replace(unseen, position=where + NOISE * rng.standard_normal(where.shape))
 
 
-def level(unseen: Dataset) -> float:
-    """Return how much larger the variances of a fit become."""
+def told(fit: Fit, data: Dataset) -> Unseen:
+    """Return what readings say that a fit has not seen."""
+    unseen = Unseen.of(fit, data, campaign()[0].of_configurations(np.arange(20)))
+    assert unseen is not None
+    return unseen
+
+
+def shown_by(data: Dataset) -> Fit:
+    """Return the fit as readings show it that it has not seen."""
+    return told(campaign()[1], data).as_shown(campaign()[1])
+
+
+def level(data: Dataset) -> float:
+    """Return how much larger the variance becomes along the direction that changes most."""
     _, fit = campaign()
-    shown = as_unseen_shows(fit, unseen)
-    return float(shown.covariance_parts[0].covariance[0, 0] / fit.covariance_parts[0].covariance[0, 0])
+    size = fit.free.prior
+    before, after = (one.covariance / np.outer(size, size) for one in (fit, shown_by(data)))
+    times = np.linalg.eigvals(np.linalg.solve(before, after)).real
+    return float(times[np.argmax(np.abs(np.log(times)))])
 
 
 def test_parameters_are_as_uncertain_as_unseen_readings_show() -> None:
@@ -61,13 +75,22 @@ def test_parameters_are_as_uncertain_as_unseen_readings_show() -> None:
     assert 4.0 < levels[3.0] < 14.0
 
 
+def test_what_is_known_beforehand_stays_so() -> None:
+    """The height of the base and that of the first joint stand in for each other: no reading tells which it is."""
+    _, fit = campaign()
+    shown = shown_by(read(3.0, 0))
+    for name in ("d_1", "d_6"):
+        before, after = (one.robot.parameters[name] for one in (fit, shown))
+        assert before.informed is not None
+        assert before.informed < 0.1
+        assert after.deviation == pytest.approx(before.deviation, rel=0.1)
+
+
 def test_deviations_of_parameters_follow() -> None:
     _, fit = campaign()
-    shown = as_unseen_shows(fit, read(3.0, 0))
+    shown = shown_by(read(3.0, 0))
     name = fit.free.names[0]
-    before, after = (one.robot.parameters[name].deviation for one in (fit, shown))
-    assert before is not None
-    assert after == pytest.approx((shown.covariance[0, 0] / fit.covariance[0, 0]) ** 0.5 * before)
+    assert shown.robot.parameters[name].deviation == pytest.approx(shown.covariance[0, 0] ** 0.5)
     assert shown.robot.values == fit.robot.values
 
 
@@ -77,9 +100,9 @@ def test_draws_that_contradict_unseen_readings_do_not_count(times: float) -> Non
     wide, narrow = [], []
     for seed in range(5):
         unseen = read(times, seed)
-        shown = as_unseen_shows(fit, unseen)
+        shown = shown_by(unseen)
         wide.append(expected_error(shown).overall)
-        narrow.append(expected_error(shown, unseen=unseen).overall)
+        narrow.append(expected_error(shown, unseen=told(shown, unseen)).overall)
     for all_draws, agreeing in zip(wide, narrow, strict=True):
         assert np.diff(agreeing.interval_90) < 0.9 * np.diff(all_draws.interval_90)
     off = [np.median(errors_of(fit.robot, read(times, seed)).position_norms) for seed in range(5)]
@@ -96,16 +119,21 @@ def test_a_few_wrong_readings_say_nothing() -> None:
 def test_of_named_models_nothing_changes() -> None:
     data, _ = campaign()
     fit = identify(IRB120, data.of_configurations(np.arange(20)), named_model("geometric"))
-    assert as_unseen_shows(fit, data.of_configurations(np.arange(20, 40))) is fit
+    assert Unseen.of(fit, data.of_configurations(np.arange(20, 40)), data) is None
 
 
 def test_noise_alone_says_nothing() -> None:
     """Where an instrument is so coarse that errors do not show, the level stays what is believed."""
     _, fit = campaign()
     coarse = replace(fit, sigma={**fit.sigma, "position": 1e-3})
-    unseen = read(1.0, 0)
-    noisy = replace(unseen, position=unseen.position + 1e-3 * np.random.default_rng(1).standard_normal((60, 3)))
-    shown = as_unseen_shows(coarse, noisy)
+    rng = np.random.default_rng(1)
+    noisy, trained = (
+        replace(one, position=one.position + 1e-3 * rng.standard_normal((60, 3)))
+        for one in (read(1.0, 0), campaign()[0].of_configurations(np.arange(20)))
+    )
+    unseen = Unseen.of(coarse, noisy, trained)
+    assert unseen is not None
+    shown = unseen.as_shown(coarse)
     assert shown.covariance[0, 0] == pytest.approx(coarse.covariance[0, 0], rel=0.2)
-    all_draws, agreeing = (expected_error(shown, unseen=one).overall.interval_90 for one in (None, noisy))
+    all_draws, agreeing = (expected_error(shown, unseen=one).overall.interval_90 for one in (None, unseen))
     assert agreeing == pytest.approx(all_draws, rel=0.15)

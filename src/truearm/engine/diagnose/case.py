@@ -13,17 +13,13 @@ from truearm.engine.data.rigid_tool import OUTLIERS, TARGET_MISTAKEN, TARGETS_SW
 from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import JOINTS_REPEATED
 from truearm.engine.diagnose.changes import Change, notices_of_change, what_moved
-from truearm.engine.diagnose.expected_error import (
-    ExpectedError,
-    as_residuals_allow,
-    expected_error,
-    moved_by_order,
-)
+from truearm.engine.diagnose.expected_error import ExpectedError, expected_error, moved_by_order
 from truearm.engine.diagnose.far_off import PULLING
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
 from truearm.engine.diagnose.off_configurations import Off, off_configurations
+from truearm.engine.diagnose.position_errors import as_residuals_allow
 from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA, LeftOver
-from truearm.engine.diagnose.unseen import can_tell
+from truearm.engine.diagnose.unseen import Unseen
 from truearm.engine.diagnose.visits import check_sigma, check_sigma_beside_joints
 from truearm.engine.diagnose.wrong_robot import (
     IMPLAUSIBLE,
@@ -53,15 +49,11 @@ class Case:
     fit: Fit
     data: Dataset  #: All readings, training and held out.
     training: Dataset
-    unseen: Dataset | None  #: What was held out.
-    errors: Errors  #: By which it is judged: of what was held out, of the training readings where nothing was.
+    unseen: Unseen | None  #: What was held out, where it says how uncertain the parameters are.
+    errors: Errors  #: By which it is judged: of what was held out, if `held_out`, of the training readings otherwise.
     noticed: tuple[Notice, ...]  #: What was said of the data before they were fitted.
     of_split: tuple[Notice, ...]  #: What speaks against the split.
-
-    @property
-    def held_out(self) -> bool:
-        """Whether anything was held out."""
-        return self.unseen is not None
+    held_out: bool
 
     @cached_property
     def left(self) -> LeftOver:
@@ -135,9 +127,8 @@ class Case:
         doubted = has_error([*self.of_data, *self.changes]) or any(n.code in _DOUBTING for n in self.of_data)
         allowed = as_residuals_allow(self.fit, self.training)
         by_order = moved_by_order(self.fit.robot, self.training)
-        unseen = self.unseen if self.unseen is not None and can_tell(allowed, self.unseen) else None
         return expected_error(
-            allowed, unseen=unseen, by_order=by_order, plausible=not self.implausible, doubted=doubted
+            allowed, unseen=self.unseen, by_order=by_order, plausible=not self.implausible, doubted=doubted
         )
 
     @property

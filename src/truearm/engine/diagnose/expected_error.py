@@ -21,13 +21,11 @@ from typing import Final
 import numpy as np
 
 from truearm.engine.data.dataset import Dataset
-from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.position_errors import PositionErrors, by_joints, to_targets
-from truearm.engine.diagnose.unseen import agreeing
+from truearm.engine.diagnose.position_errors import PositionErrors, error_by_joints
+from truearm.engine.diagnose.unseen import Unseen
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.parts import Payload
-from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 
 #: Configurations at which positions are asked for, and draws of the parameters' errors: fewer for many targets.
@@ -37,8 +35,6 @@ _POSITIONS: Final = 3_000
 _LENGTHS: Final = 3_000_000
 #: Share of the squared error from which what the model leaves makes the figure a lower bound.
 _LEAST_BY_JOINTS: Final = 0.1
-#: Share of the equations that parameters leave to the residuals at least.
-_LEAST_LEFT: Final = 0.1
 #: Configurations of a map, however many targets there are.
 _LEAST_MAPPED: Final = 20
 _INTERVAL: Final = (5.0, 95.0)
@@ -85,7 +81,7 @@ def expected_error(
     fit: Fit,
     seed: int = 0,
     *,
-    unseen: Dataset | None = None,
+    unseen: Unseen | None = None,
     by_order: Array | None = None,
     plausible: bool = True,
     doubted: bool = False,
@@ -109,8 +105,8 @@ def expected_error(
     few, many = _DRAWS
     draws = min(many, max(few, _LENGTHS // (count * max(len(robot.targets), 1))))
     joints = _all_over(robot, count, np.random.default_rng(seed))
-    by_joints = _error_by_joints(fit, joints)
-    counts = np.arange(draws) if unseen is None else agreeing(PositionErrors(fit, draws, seed), unseen)
+    by_joints = error_by_joints(fit, joints)
+    counts = np.arange(draws) if unseen is None else unseen.agreeing(PositionErrors(fit, draws, seed))
     if by_order is not None:
         fit = replace(fit, joint_error=np.hypot(fit.joint_error, by_order))
     lengths = PositionErrors(fit, draws, seed).at(joints)[counts]
@@ -122,7 +118,7 @@ def expected_error(
         without_scale=without_scale,
         targets={t.name: _expectation(lengths[:, k]) for k, t in enumerate(robot.targets)},
         joint_error=fit.joint_error,
-        by_joint_error=_error_by_joints(fit, joints),
+        by_joint_error=error_by_joints(fit, joints),
         payload=robot.payload,
         located=not fit.gauge_freedoms,
         omissions=tuple(_omissions(fit, by_joints, overall, plausible=plausible, doubted=doubted)),
@@ -148,25 +144,6 @@ def error_by_order(robot: Robot, data: Dataset) -> float:
     unknown = replace(at, approach=None, number=None)
     apart = [robot.world_poses(at, t.name)[0] - robot.world_poses(unknown, t.name)[0] for t in robot.targets]
     return math.sqrt(float(np.mean(np.sum(np.square(apart), axis=-1))))
-
-
-def as_residuals_allow(fit: Fit, data: Dataset) -> Fit:
-    """Return a fit whose joint errors move the targets no further than the readings have been found to lie off.
-
-    Residuals that hang together in another way than errors of the joints make them are not explained by any: what was
-    found for the joints is then too large in some directions.
-
-    Args:
-        data: The training readings.
-    """
-    off = errors_of(fit.robot, data).position_norms
-    if not fit.joint_error.any() or fit.gauge_freedoms or not len(off):
-        return fit
-    some = np.linspace(0, data.configurations - 1, min(data.configurations, _CONFIGURATIONS[1])).round()
-    moved = _error_by_joints(fit, data.postures.at(some.astype(np.intp)))
-    spent = sum(fit.robot.parameters[name].informed or 0.0 for name in fit.free.names)
-    left = float(np.mean(off**2)) / max(1.0 - spent / (3 * len(off)), _LEAST_LEFT) - 3.0 * fit.sigma["position"] ** 2
-    return replace(fit, joint_error=fit.joint_error * math.sqrt(min(max(left / moved**2, 0.0), 1.0)))
 
 
 def expected_map(fit: Fit, positions: int, seed: int = 0) -> tuple[Array, Array]:
@@ -207,15 +184,6 @@ def _expectation(lengths: Array) -> Expectation:
         p95=float(np.percentile(lengths, 95, axis=1).mean()),
         interval_90=(float(low), float(high)),
     )
-
-
-def _error_by_joints(fit: Fit, joints: Array | Postures) -> float:
-    """Return the root mean square error of the targets that the joints' error of a visit makes [m]."""
-    if not fit.joint_error.any():
-        return 0.0
-    at = fit.robot.loaded(joints)
-    moved = [by_joints(fit, kinematics) * fit.joint_error[:, None, None] for kinematics in to_targets(fit, at)]
-    return math.sqrt(float(np.mean([np.sum(J**2, axis=(0, 1)) for J in moved])))
 
 
 def _omissions(fit: Fit, by_joints: float, overall: Expectation, *, plausible: bool, doubted: bool) -> Iterator[str]:

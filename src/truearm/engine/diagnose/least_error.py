@@ -71,6 +71,9 @@ def least_errors(
     errors, by_fit = errors_of(robot, data), dict[Kind, float]()
     if fit is not None and fit.loss == "linear":
         by_fit = _by_fit(fit, judged, fit.joint_error if joint_error is None else joint_error)
+        seen = errors_of(robot, judged)  # exact parameters leave no more than these do
+        left = {"position": seen.position, "orientation": seen.orientation, "length": seen.length}
+        by_fit = {kind: min(mean, of.mean) for kind, mean in by_fit.items() if (of := left[kind]) is not None}
     least = dict[Kind, LeastError]()
     for kind in _KINDS:
         declared = _declared(judged, kind)

@@ -16,13 +16,12 @@ from truearm.engine.data.statistics import Errors
 from truearm.engine.diagnose.curves import has_curves
 from truearm.engine.diagnose.expected_error import (
     ExpectedError,
-    as_residuals_allow,
     error_by_order,
     expected_error,
     expected_map,
     moved_by_order,
 )
-from truearm.engine.diagnose.position_errors import PositionErrors
+from truearm.engine.diagnose.position_errors import PositionErrors, as_residuals_allow
 from truearm.engine.diagnose.unmodelled import PULLED_AWAY
 from truearm.engine.diagnose.wrong_robot import IMPLAUSIBLE
 from truearm.engine.fit.fit import Fit, identify

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.problem import gauge_motions
 from truearm.engine.robot.chain import Array, ForwardKinematics
@@ -25,6 +27,9 @@ _TRIED_CONFIGURATIONS: Final = 40
 _BASE: Final = ("base",)
 #: So that the variance of what is drawn exists.
 _LEAST_FREEDOM: Final = 3.0
+#: Share of the equations that parameters leave to the residuals at least, and configurations that are looked at.
+_LEAST_LEFT: Final = 0.1
+_MOST_CONFIGURATIONS: Final = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,3 +231,31 @@ def _without(motions: tuple[str, ...], fit: Fit, at: Postures, moves: Array) -> 
     flat = np.swapaxes(moves, 0, 1).reshape(draws, -1)
     left = flat - (flat @ Q) @ Q.T
     return np.swapaxes(left.reshape(draws, targets, *moves.shape[2:]), 0, 1)
+
+
+def as_residuals_allow(fit: Fit, data: Dataset) -> Fit:
+    """Return a fit whose joint errors move the targets no further than the readings have been found to lie off.
+
+    Residuals that hang together in another way than errors of the joints make them are not explained by any: what was
+    found for the joints is then too large in some directions.
+
+    Args:
+        data: The training readings.
+    """
+    off = errors_of(fit.robot, data).position_norms
+    if not fit.joint_error.any() or fit.gauge_freedoms or not len(off):
+        return fit
+    some = np.linspace(0, data.configurations - 1, min(data.configurations, _MOST_CONFIGURATIONS)).round()
+    moved = error_by_joints(fit, data.postures.at(some.astype(np.intp)))
+    spent = sum(fit.robot.parameters[name].informed or 0.0 for name in fit.free.names)
+    left = float(np.mean(off**2)) / max(1.0 - spent / (3 * len(off)), _LEAST_LEFT) - 3.0 * fit.sigma["position"] ** 2
+    return replace(fit, joint_error=fit.joint_error * math.sqrt(min(max(left / moved**2, 0.0), 1.0)))
+
+
+def error_by_joints(fit: Fit, joints: Array | Postures) -> float:
+    """Return the root mean square error of the targets that the joints' error of a visit makes [m]."""
+    if not fit.joint_error.any():
+        return 0.0
+    at = fit.robot.loaded(joints)
+    moved = [by_joints(fit, kinematics) * fit.joint_error[:, None, None] for kinematics in to_targets(fit, at)]
+    return math.sqrt(float(np.mean([np.sum(J**2, axis=(0, 1)) for J in moved])))

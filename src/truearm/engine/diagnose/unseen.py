@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.position_errors import PositionErrors
+from truearm.engine.diagnose.position_errors import PositionErrors, as_residuals_allow
 from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects import EFFECTS
+from truearm.engine.robot.effects.compliance import Compliance
 
 # Where every effect is in the model, how large effects are is found from the same readings as the parameters, and few
 # readings leave that open. All errors of the parameters are then larger or smaller by one level. It is believed to be
@@ -28,80 +30,100 @@ _LEAST_SHARE: Final = 0.02
 _LEAST_LEVEL: Final = 0.01
 #: By how much the error over the workspace may differ from that at unseen configurations, a deviation of logarithms.
 _ELSEWHERE: Final = 0.07
+#: Effects whose size the readings tell.
+_SIZED: Final = frozenset(effect.name for effect in EFFECTS) - {Compliance.name}
+#: Median length of three normal numbers of deviation one.
+_MEDIAN_LENGTH: Final = 1.5382
 
 
-def as_unseen_shows(fit: Fit, unseen: Dataset) -> Fit:
-    """Return a fit whose parameters are as uncertain as its errors at configurations that it has not seen show.
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """Readings that a fit was not trained on, and how large its errors are there."""
 
-    Only of a fit of every effect, whose readings locate the robot.
+    data: Dataset
+    allowed: Fit  #: The fit, with joint errors that are no larger than the training readings allow.
+    median: float  #: Of the errors [m].
+    noise: float  #: Deviation of a coordinate of a reading [m].
 
-    Args:
-        unseen: Readings of the same campaign that the fit was not trained on.
+    @classmethod
+    def of(cls, fit: Fit, data: Dataset, training: Dataset) -> Self | None:
+        """Return what they say of a fit of every effect whose readings locate the robot; None of any other.
+
+        Wrong readings make residuals larger than the noise is. It is no larger than the median of the residuals says.
+        """
+        if not fit.model.weighed or fit.gauge_freedoms or not data.has_position.any():
+            return None
+        off, left = (float(np.median(errors_of(fit.robot, part).position_norms)) for part in (data, training))
+        unspent = max(1.0 - fit.spent / fit.numbers, _LEAST_SHARE)
+        noise = min(fit.excess * fit.sigma["position"], left / (_MEDIAN_LENGTH * math.sqrt(unspent)))
+        return cls(data, as_residuals_allow(fit, training), off, noise) if off > 0.0 else None
+
+    def as_shown(self, fit: Fit) -> Fit:
+        """Return the fit with parameters that are as uncertain as these readings show."""
+        some = replace(
+            self, data=self.data.of_configurations(np.arange(min(self.data.configurations, _CONFIGURATIONS)))
+        )
+        of_one_size = replace(
+            fit,
+            covariance_parts=tuple(replace(part, freedom=math.inf) for part in fit.covariance_parts),
+            joint_freedom=np.full(len(fit.joint_error), np.inf),
+        )
+        by_parameters = PositionErrors(replace(of_one_size, joint_error=np.zeros(len(fit.joint_error))), _DRAWS)
+        lengths = some.seen(PositionErrors(of_one_size, _DRAWS))
+        medians = np.log(np.median(lengths, axis=1))
+        share = float(np.mean(some.moved(by_parameters) ** 2)) / float(np.mean(lengths**2))
+        share = min(max(share, _LEAST_SHARE), 1.0)
+        square = (self.median / math.exp(float(medians.mean()))) ** 2
+        level = max((square - 1.0 + share) / share, _LEAST_LEVEL)
+        share = max(share, 1.0 - (1.0 - share) / square)
+        believed, told = 0.5 / fit.covariance_parts[-1].freedom, float(medians.var()) / share**2
+        level **= believed / (believed + told)
+        return _enlarged(fit, level)
+
+    def agreeing(self, errors: PositionErrors) -> NDArray[np.intp]:
+        """Return indices of as many draws, each as often as its errors agree with these readings, ``(draws,)``.
+
+        They are weighed by a normal density of the logarithm of the median error (importance resampling).
+        """
+        medians = np.log(np.median(self.seen(errors), axis=1))
+        apart = ((medians - math.log(self.median)) / _ELSEWHERE) ** 2
+        weight = np.cumsum(np.exp(-0.5 * (apart - apart.min())))
+        evenly = (np.arange(errors.draws) + 0.5) / errors.draws
+        return np.asarray(np.searchsorted(weight, evenly * weight[-1]), dtype=np.intp)
+
+    def moved(self, errors: PositionErrors) -> Array:
+        """Return how far errors move the targets of the readings, ``(draws, readings)`` [m]."""
+        names = [target.name for target in errors.fit.robot.targets]
+        target = np.array([names.index(name) for name in self.data.targets])[self.data.target]
+        at = errors.at(self.data.joints)[:, target, self.data.configuration]
+        return np.asarray(at[:, self.data.has_position])
+
+    def seen(self, errors: PositionErrors) -> Array:
+        """Return the same as an instrument would see it, with its noise."""
+        moved = self.moved(errors)
+        noise = self.noise * np.random.default_rng((errors.seed, 4)).standard_normal((*moved.shape, 3))
+        noise[..., 0] += moved
+        return np.asarray(np.linalg.norm(noise, axis=2))
+
+
+def _enlarged(fit: Fit, level: float) -> Fit:
+    """Return a fit whose parameters have a variance so many times as large, as far as readings told them.
+
+    What is known of a direction beforehand stays so. Of effects the readings told what is expected of their sizes.
     """
-    if not can_tell(fit, unseen):
-        return fit
-    some = unseen.of_configurations(np.arange(min(unseen.configurations, _CONFIGURATIONS)))
-    of_one_size = replace(
-        fit,
-        covariance_parts=tuple(replace(part, freedom=math.inf) for part in fit.covariance_parts),
-        joint_freedom=np.full(len(fit.joint_error), np.inf),
-    )
-    by_parameters = replace(of_one_size, joint_error=np.zeros(len(fit.joint_error)))
-    lengths = _seen(PositionErrors(of_one_size, _DRAWS), some)
-    medians = np.log(np.median(lengths, axis=1))
-    share = float(np.mean(_moved(PositionErrors(by_parameters, _DRAWS), some) ** 2)) / float(np.mean(lengths**2))
-    share = min(max(share, _LEAST_SHARE), 1.0)
-    square = (_middle(fit, unseen) / math.exp(float(medians.mean()))) ** 2
-    level = max((square - 1.0 + share) / share, _LEAST_LEVEL)
-    share = max(share, 1.0 - (1.0 - share) / square)
-    believed, told = 0.5 / fit.covariance_parts[-1].freedom, float(medians.var()) / share**2
-    level **= believed / (believed + told)
-    found = (fit.robot.parameters[name] for name in (*fit.free.names, *fit.unfitted))
+    found = [fit.robot.parameters[name] for name in (*fit.free.names, *fit.unfitted)]
+    whole = np.sum([part.covariance for part in fit.covariance_parts], axis=0)
+    size = np.array([p.prior for p in found])
+    size = np.where([p.group in _SIZED for p in found], 1e3 * np.maximum(size, np.sqrt(np.diag(whole))), size)
+    left, directions = np.linalg.eigh(whole / np.outer(size, size))
+    times = directions * level ** (0.5 * (1.0 - np.clip(left, 0.0, 1.0))) @ directions.T
+    times = size[:, None] * times / size
+    parts = tuple(replace(part, covariance=times @ part.covariance @ times.T) for part in fit.covariance_parts)
+    whole, free = np.sum([part.covariance for part in parts], axis=0), len(fit.free.names)
+    deviations = zip(found, np.sqrt(np.diag(whole)).tolist(), strict=True)
     return replace(
         fit,
-        robot=fit.robot.with_parameters(
-            replace(p, deviation=math.sqrt(level) * p.deviation) for p in found if p.deviation is not None
-        ),
-        covariance=level * fit.covariance,
-        covariance_parts=tuple(replace(part, covariance=level * part.covariance) for part in fit.covariance_parts),
+        robot=fit.robot.with_parameters(replace(p, deviation=d) for p, d in deviations if p.deviation is not None),
+        covariance=whole[:free, :free],
+        covariance_parts=parts,
     )
-
-
-def can_tell(fit: Fit, unseen: Dataset) -> bool:
-    """Return whether unseen readings tell how uncertain the parameters of a fit are."""
-    of_robot = set(unseen.targets).issubset(target.name for target in fit.robot.targets)
-    return fit.model.weighed and not fit.gauge_freedoms and of_robot and _middle(fit, unseen) > 0.0
-
-
-def agreeing(errors: PositionErrors, unseen: Dataset) -> NDArray[np.intp]:
-    """Return indices of as many draws, each as often as its errors agree with those at unseen readings, ``(draws,)``.
-
-    They are weighed by a normal density of the logarithm of the median error (importance resampling).
-    """
-    medians = np.log(np.median(_seen(errors, unseen), axis=1))
-    apart = ((medians - math.log(_middle(errors.fit, unseen))) / _ELSEWHERE) ** 2
-    weight = np.cumsum(np.exp(-0.5 * (apart - apart.min())))
-    evenly = (np.arange(errors.draws) + 0.5) / errors.draws
-    return np.asarray(np.searchsorted(weight, evenly * weight[-1]), dtype=np.intp)
-
-
-def _middle(fit: Fit, data: Dataset) -> float:
-    """Return the median error of a fit at readings [m], 0 without any."""
-    off = errors_of(fit.robot, data).position_norms
-    return float(np.median(off)) if len(off) else 0.0
-
-
-def _moved(errors: PositionErrors, data: Dataset) -> Array:
-    """Return how far errors move the targets of readings, ``(draws, readings)`` [m]."""
-    names = [target.name for target in errors.fit.robot.targets]
-    target = np.array([names.index(name) for name in data.targets])[data.target]
-    return np.asarray(errors.at(data.joints)[:, target, data.configuration])
-
-
-def _seen(errors: PositionErrors, data: Dataset) -> Array:
-    """Return the same as an instrument would see it, with its noise."""
-    moved, fit = _moved(errors, data), errors.fit
-    noise = np.random.default_rng((errors.seed, 4)).standard_normal((*moved.shape, 3))
-    noise *= fit.excess * fit.sigma["position"]
-    noise[..., 0] += moved
-    return np.asarray(np.linalg.norm(noise, axis=2))

@@ -154,6 +154,17 @@ def test_a_temperature_is_in_no_plan() -> None:
         plan_measurements(arm, random_candidates(arm, 50, rng), model, poses=20, rng=rng)
 
 
+def test_a_growth_of_zero_needs_no_temperature() -> None:
+    """A calibration of every effect has it where a temperature was recorded, and finds it to be zero."""
+    arm = with_targets(load_robot("irb120")).with_effects(["thermal-growth"])
+    rng = np.random.default_rng(0)
+    candidates = random_candidates(arm, 5, rng)
+    assert sensitivity(arm, candidates, MODEL["geometric"].free(arm), 1e-4).rows.any()
+    with pytest.raises(InputError, match="temperature"):
+        grown = arm.with_values({"thermal_growth_3": 1e-5})
+        sensitivity(grown, candidates, MODEL["geometric"].free(grown), 1e-4)
+
+
 def test_a_robot_without_targets_tells_nothing() -> None:
     rng, arm = np.random.default_rng(0), load_robot("irb120")
     with pytest.raises(InputError, match="no targets"):

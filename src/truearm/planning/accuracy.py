@@ -232,7 +232,7 @@ def sensitivity(
     Raises:
         InputError: If the robot has no targets, or an effect of the model needs to know more than the postures tell.
     """
-    check_known(robot, postures)
+    check_known(robot, postures, free)
     refuse_beyond(
         "derivatives", len(postures) * 3 * len(robot.targets) * len(free.parameters), where=f"{robot.name}, candidates"
     )
@@ -258,7 +258,7 @@ def sensitivity_of_readings(robot: Robot, data: Dataset, free: FreeParameters, n
         data: Readings; what they say does not matter. What is known of fixtures counts as known.
         free, noise: As for :func:`sensitivity`; an angle counts as what it moves at a radius of 0.1 m.
     """
-    check_known(robot, data.postures)
+    check_known(robot, data.postures, free)
     kinds = {observation.name: noise for observation in OBSERVATIONS} | {"orientation": noise / _LEVER}
     plain = replace(data, sigma=None, sigma_rot=None)
     problem = Problem(robot, plain, free, kinds, priors=False)
@@ -282,12 +282,12 @@ def sensitivity_of_readings(robot: Robot, data: Dataset, free: FreeParameters, n
     return Sensitivity(free, size, rows, fixed.T @ fixed)
 
 
-def check_known(robot: Robot, postures: Postures) -> None:
-    """Refuse a robot that nobody sees, and effects of any size that need to know what no plan knows."""
+def check_known(robot: Robot, postures: Postures, free: FreeParameters) -> None:
+    """Refuse a robot that nobody sees, and effects that need to know what no plan knows, if they do anything."""
     if not robot.targets:
         raise InputError("the robot has no targets, so nothing can be measured", where=robot.name)
     for effect in robot.effects:
-        grows = any(robot.values[parameter.name] != 0.0 for parameter in effect.parameters)
+        grows = any(robot.values[p.name] != 0.0 or p.name in free.names for p in effect.parameters)
         if effect.warmed and grows and postures.temperature is None:
             raise InputError(
                 f"the effect {effect.name} needs the temperature of the arm, which a plan does not have",

@@ -258,7 +258,13 @@ def _begun_at(problem: Problem, near: Solved) -> Problem:
     known = dict(zip(near.problem.free.names, map(float, near.solution.vector), strict=True))
     values = {name: value for name, value in known.items() if name in problem.free.names}
     started = FreeParameters(tuple(replace(p, value=values.get(p.name, p.value)) for p in problem.free.parameters))
-    return replace(problem, robot=problem.robot.with_values(values), free=started, noise=near.problem.noise)
+    return replace(
+        problem,
+        robot=problem.robot.with_values(values),
+        free=started,
+        noise=near.problem.noise,
+        widened=near.problem.widened,
+    )
 
 
 def in_the_middle(robot: Robot, data: Dataset) -> Robot:

@@ -160,8 +160,8 @@ def test_a_growth_of_zero_needs_no_temperature() -> None:
     rng = np.random.default_rng(0)
     candidates = random_candidates(arm, 5, rng)
     assert sensitivity(arm, candidates, MODEL["geometric"].free(arm), 1e-4).rows.any()
+    grown = arm.with_values({"thermal_growth_3": 1e-5})
     with pytest.raises(InputError, match="temperature"):
-        grown = arm.with_values({"thermal_growth_3": 1e-5})
         sensitivity(grown, candidates, MODEL["geometric"].free(grown), 1e-4)
 
 

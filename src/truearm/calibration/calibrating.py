@@ -233,7 +233,8 @@ class _Identified:
     robot: Robot  #: The nominal one, with the periods of gears that were found.
     placed: Robot  #: The nominal one, base and targets found as the fit finds them.
     model: Model
-    fit: Fit
+    fit: Fit  #: As uncertain as held-out readings show it.
+    unseen: Unseen | None  #: These, where they say that.
     shares: Shares | None  #: What every effect does; None if the model was named.
     contradicted: tuple[Notice, ...]  #: What speaks against what was held.
     notices: tuple[Notice, ...]  #: What is to be known about the effects.
@@ -364,15 +365,15 @@ def _identified(asked: Calibrate, read: _Read, parts: _Parts) -> _Identified:
                 progress=asked.progress,
             )
     contradicted = check_fixed_places(robot, fit, first, **read.options)
-    return _Identified(robot, placed, model, fit, shares, tuple(contradicted), tuple(notices))
+    unseen = None if parts.second is None else Unseen.of(fit, parts.second, first)
+    fit = fit if unseen is None else unseen.as_shown(fit)
+    return _Identified(robot, placed, model, fit, unseen, shares, tuple(contradicted), tuple(notices))
 
 
 def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -> Calibration:
     """Judge what was identified by the part that it has not seen."""
     asked.progress("judging it")
     fit, first, second = solved.fit, parts.first, parts.second
-    unseen = None if second is None else Unseen.of(fit, second, first)
-    fit = fit if unseen is None else unseen.as_shown(fit)
     validation = None if second is None else errors_of(fit.robot, second)
     train_errors = errors_of(fit.robot, first)
     of_split = (
@@ -401,7 +402,7 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
             fit,
             parts.readings,
             first,
-            unseen,
+            solved.unseen,
             validation or train_errors,
             tuple(parts.noticed),
             of_split,

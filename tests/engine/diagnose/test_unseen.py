@@ -16,6 +16,7 @@ from truearm.engine.diagnose.unseen import Unseen
 from truearm.engine.fit.every_effect import identify_every_effect
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import named_model
+from truearm.engine.robot.effects.warm_up import LEFT
 from truearm.engine.robot.library import load_robot
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import measure
@@ -84,6 +85,21 @@ def test_what_is_known_beforehand_stays_so() -> None:
         assert before.informed is not None
         assert before.informed < 0.1
         assert after.deviation == pytest.approx(before.deviation, rel=0.1)
+
+
+def test_how_warm_the_arm_was_is_known_there() -> None:
+    """Readings of the campaign know it; programs do not, however well the readings are met."""
+    _, fit = campaign()
+    names = (*fit.free.names, *fit.unfitted)
+    sized = (np.arange(len(names) + 1) < len(names)).astype(bool)
+    robot = fit.robot.with_effects(["warm-up"])
+    parts = tuple(part.among(sized) for part in fit.covariance_parts)
+    parts[-1].covariance[-1, -1] = 0.09
+    warm = replace(fit, robot=robot, start=fit.start.with_effects(["warm-up"]), covariance_parts=parts)
+    warm = replace(warm, unfitted=(*fit.unfitted, LEFT))
+    shown = told(warm, read(3.0, 0)).as_shown(warm)
+    assert shown.covariance_parts[-1].covariance[-1, -1] == pytest.approx(0.09)
+    assert shown.covariance[0, 0] > 1.0000001 * fit.covariance[0, 0]
 
 
 def test_deviations_of_parameters_follow() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -102,13 +102,18 @@ class PositionErrors:
             np.linalg.norm(curved - straight, axis=2).mean() > _CURVED * np.linalg.norm(straight, axis=2).mean()
         )
 
-    def at(self, joints: Array) -> Array:
-        """Return the lengths of the errors at joint positions ``(n, joints)``: ``(draws, targets, n)`` [m]."""
+    def at(self, joints: Array, without: Collection[str] = ()) -> Array:
+        """Return the lengths of the errors at joint positions ``(n, joints)``: ``(draws, targets, n)`` [m].
+
+        Args:
+            without: Names of parameters that are right there.
+        """
         fit, at = self.fit, self.fit.robot.loaded(joints)
         shape = (self.draws, len(joints), len(fit.joint_error))
         normal = np.random.default_rng((self.seed, 1)).standard_normal(shape) if fit.joint_error.any() else None
         shared = None if normal is None else normal * fit.joint_error * self._joint_scale[:, None]
-        moves: Iterable[Array] = _moves(fit, at, self._errors, shared, exact=self._is_curved)
+        errors = {name: error for name, error in self._errors.items() if name not in without}
+        moves: Iterable[Array] = _moves(fit, at, errors, shared, exact=self._is_curved)
         if fit.gauge_freedoms:
             moves = _without(_BASE if self.scale_counts else fit.gauge_freedoms, fit, at, np.stack([*moves]))
         return np.stack([np.sqrt(np.einsum("dxn,dxn->dn", move, move)) for move in moves], axis=1)

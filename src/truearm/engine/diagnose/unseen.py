@@ -16,6 +16,7 @@ from truearm.engine.fit.fit import Fit
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.effects.compliance import Compliance
+from truearm.engine.robot.effects.warm_up import LEFT
 
 # Where every effect is in the model, how large effects are is found from the same readings as the parameters, and few
 # readings leave that open. All errors of the parameters are then larger or smaller by one level. It is believed to be
@@ -30,6 +31,8 @@ _LEAST_SHARE: Final = 0.02
 _LEAST_LEVEL: Final = 0.01
 #: By how much the error over the workspace may differ from that at unseen configurations, a deviation of logarithms.
 _ELSEWHERE: Final = 0.07
+#: What readings of the campaign know and programs do not: how far the arm has warmed up.
+_KNOWN: Final = (LEFT,)
 #: Effects whose size the readings tell.
 _SIZED: Final = frozenset(effect.name for effect in EFFECTS) - {Compliance.name}
 #: Median length of three normal numbers of deviation one.
@@ -95,7 +98,7 @@ class Unseen:
         """Return how far errors move the targets of the readings, ``(draws, readings)`` [m]."""
         names = [target.name for target in errors.fit.robot.targets]
         target = np.array([names.index(name) for name in self.data.targets])[self.data.target]
-        at = errors.at(self.data.joints)[:, target, self.data.configuration]
+        at = errors.at(self.data.joints, _KNOWN)[:, target, self.data.configuration]
         return np.asarray(at[:, self.data.has_position])
 
     def seen(self, errors: PositionErrors) -> Array:
@@ -115,6 +118,7 @@ def _enlarged(fit: Fit, level: float) -> Fit:
     whole = np.sum([part.covariance for part in fit.covariance_parts], axis=0)
     size = np.array([p.prior for p in found])
     size = np.where([p.group in _SIZED for p in found], 1e3 * np.maximum(size, np.sqrt(np.diag(whole))), size)
+    size = np.where([p.name in _KNOWN for p in found], np.sqrt(np.maximum(np.diag(whole), 1e-24)), size)
     left, directions = np.linalg.eigh(whole / np.outer(size, size))
     times = directions * level ** (0.5 * (1.0 - np.clip(left, 0.0, 1.0))) @ directions.T
     times = size[:, None] * times / size

@@ -27,7 +27,9 @@ from compare import every_effect_on_twins
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.expected_error import as_residuals_allow, expected_error, moved_by_order
+from truearm.engine.diagnose.expected_error import expected_error, moved_by_order
+from truearm.engine.diagnose.position_errors import as_residuals_allow
+from truearm.engine.diagnose.unseen import Unseen
 from truearm.engine.fit.every_effect import identify_every_effect
 from truearm.engine.fit.fit import Fit, identify
 from truearm.engine.fit.models import named_model
@@ -43,6 +45,8 @@ from truearm.engine.twin.twin_joint import JointTruth
 OUT = Path(__file__).with_suffix(".json")
 NOISE, EXACT, REPEATABILITY = 1.5e-5, 1e-9, np.radians(0.002)
 COUNTS, TARGETS, JUDGED = (20, 30, 60, 150, 300), (1, 3), 300
+#: Share of the configurations that is trained on, as `calibrate` does; the rest judges.
+TRAINED: Final = 0.7
 #: Places in a session at which the arm is judged: a twin computes each anew.
 PLACES: Final = 20
 NOMINAL = load_robot("irb120").with_payload(Payload(2.7, (0.05, 0.025, 0.1)))
@@ -149,14 +153,19 @@ def judged(seed: int) -> list[str | float]:
     name, targets, count = names[seed % len(names)], TARGETS[rest % 2], COUNTS[rest // 2 % len(COUNTS)]
     truth, rng = TRUTHS[name], np.random.default_rng(seed)
     twin, known = drawn(truth, targets, rng)
-    data = seen(twin, count, rng)
+    every = seen(twin, round(count / TRAINED), rng)
+    order = np.random.default_rng(seed).permutation(every.configurations)
+    data, unseen = every.of_configurations(order[:count]), every.of_configurations(order[count:])
     start = time.process_time()
     fit = identify_every_effect(NOMINAL, data)[1]
     seconds = time.process_time() - start
     knowing = identify(known, data, named_model("geometric").also(truth.effects))
-    expected = expected_error(as_residuals_allow(fit, data), by_order=moved_by_order(fit.robot, data))
+    told = Unseen.of(fit, unseen, data)
+    assert told is not None
+    shown = as_residuals_allow(told.as_shown(fit), data)
+    expected = expected_error(shown, unseen=told, by_order=moved_by_order(fit.robot, data))
     sent = NOMINAL.random_configurations(JUDGED, rng)
-    approach, number = rng.choice((-1.0, 1.0), sent.shape), rng.choice(np.linspace(0, count - 1, PLACES), JUDGED)
+    approach, number = rng.choice((-1.0, 1.0), sent.shape), rng.choice(np.linspace(0, len(order) - 1, PLACES), JUDGED)
     reached = sent + REPEATABILITY * rng.standard_normal(sent.shape)
     there = twin.frames(reached, approach=approach, number=number)
     exact = measure(twin, sent, EXACT, rng, approach=approach, number=number)

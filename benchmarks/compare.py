@@ -534,8 +534,7 @@ truths:
 
 How often the interval of 90 % of the expected error held the true mean error over the workspace: inside, true below it,
 true above it. The true error contains that joints repeat. Neither the direction of approach nor the place in a session
-is known. Bound: of those above, how many were said to be a lower bound only. Measured before held-out readings left warming up
-aside, for whose sake `late` held too rarely.
+is known. Bound: of those above, how many were said to be a lower bound only.
 
 {intervals}
 

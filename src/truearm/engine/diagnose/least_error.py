@@ -68,12 +68,9 @@ def least_errors(
         joint_error: Standard deviation of the error of each joint that the residuals of the fit allow, ``(joints,)``
             [rad or m]; None for that of the fit.
     """
-    errors, by_fit = errors_of(robot, data), dict[Kind, float]()
+    errors, of, by_fit = errors_of(robot, data), errors_of(robot, judged), dict[Kind, float]()
     if fit is not None and fit.loss == "linear":
         by_fit = _by_fit(fit, judged, fit.joint_error if joint_error is None else joint_error)
-        seen = errors_of(robot, judged)  # exact parameters leave no more than these do
-        left = {"position": seen.position, "orientation": seen.orientation, "length": seen.length}
-        by_fit = {kind: min(mean, of.mean) for kind, mean in by_fit.items() if (of := left[kind]) is not None}
     least = dict[Kind, LeastError]()
     for kind in _KINDS:
         declared = _declared(judged, kind)
@@ -81,7 +78,9 @@ def least_errors(
         if again is not None:
             least[kind] = again
         elif kind in by_fit and (declared is None or by_fit[kind] > _BEYOND_DECLARED * declared):
-            least[kind] = LeastError(by_fit[kind], "residuals", declared)
+            left = {"position": of.position, "orientation": of.orientation, "length": of.length}[kind]
+            at_most = by_fit[kind] if left is None else left.mean  # exact parameters leave no more than fitted ones
+            least[kind] = LeastError(min(by_fit[kind], at_most), "residuals", declared)
         elif declared is not None:
             least[kind] = LeastError(declared, "declared", declared)
     return least

@@ -60,13 +60,16 @@ def shown_by(data: Dataset) -> Fit:
     return told(campaign()[1], data).as_shown(campaign()[1])
 
 
-def level(data: Dataset) -> float:
+def level_of(fit: Fit, shown: Fit) -> float:
     """Return how much larger the variance becomes along the direction that changes most."""
-    _, fit = campaign()
     size = fit.free.prior
-    before, after = (one.covariance / np.outer(size, size) for one in (fit, shown_by(data)))
+    before, after = (one.covariance / np.outer(size, size) for one in (fit, shown))
     times = np.linalg.eigvals(np.linalg.solve(before, after)).real
     return float(times[np.argmax(np.abs(np.log(times)))])
+
+
+def level(data: Dataset) -> float:
+    return level_of(campaign()[1], shown_by(data))
 
 
 def test_parameters_are_as_uncertain_as_unseen_readings_show() -> None:
@@ -99,7 +102,17 @@ def test_how_warm_the_arm_was_is_known_there() -> None:
     warm = replace(warm, unfitted=(*fit.unfitted, LEFT))
     shown = told(warm, read(3.0, 0)).as_shown(warm)
     assert shown.covariance_parts[-1].covariance[-1, -1] == pytest.approx(0.09)
-    assert shown.covariance[0, 0] > 1.0000001 * fit.covariance[0, 0]
+    assert level_of(fit, shown) == pytest.approx(level(read(3.0, 0)), rel=0.2)
+
+
+def test_errors_of_joints_count_as_far_as_residuals_allow() -> None:
+    """Larger ones would explain the errors at unseen readings, and the parameters would seem to be known."""
+    _, fit = campaign()
+    too_large = replace(fit, joint_error=np.full(6, 1e-3), joint_freedom=np.full(6, 20.0))
+    unseen = read(3.0, 0)
+    shown = told(too_large, unseen).as_shown(too_large)
+    assert shown.joint_error is too_large.joint_error
+    assert level_of(fit, shown) == pytest.approx(level(unseen), rel=0.2)
 
 
 def test_deviations_of_parameters_follow() -> None:

@@ -25,7 +25,7 @@ from truearm.engine.robot.effects.warm_up import LEFT
 #
 #: Errors that are drawn, and configurations that are looked at.
 _DRAWS: Final = 400
-_CONFIGURATIONS: Final = 100
+_CONFIGURATIONS: Final = 200
 #: Least share of the squared errors that what the parameters do counts for, and least variance that is theirs.
 _LEAST_SHARE: Final = 0.02
 _LEAST_LEVEL: Final = 0.01
@@ -44,7 +44,7 @@ class Unseen:
     """Readings that a fit was not trained on, and how large its errors are there."""
 
     data: Dataset
-    allowed: Fit  #: The fit, with joint errors that are no larger than the training readings allow.
+    joint_error: Array  #: Of the fit, as far as the training readings allow it [rad or m], ``(joints,)``.
     median: float  #: Of the errors [m].
     noise: float  #: Deviation of a coordinate of a reading [m].
 
@@ -54,27 +54,26 @@ class Unseen:
 
         Wrong readings make residuals larger than the noise is. It is no larger than the median of the residuals says.
         """
+        data = data.of_configurations(np.arange(min(data.configurations, _CONFIGURATIONS)))
         if not fit.model.weighed or fit.gauge_freedoms or not data.has_position.any():
             return None
         off, left = (float(np.median(errors_of(fit.robot, part).position_norms)) for part in (data, training))
         unspent = max(1.0 - fit.spent / fit.numbers, _LEAST_SHARE)
         noise = min(fit.excess * fit.sigma["position"], left / (_MEDIAN_LENGTH * math.sqrt(unspent)))
-        return cls(data, as_residuals_allow(fit, training), off, noise) if off > 0.0 else None
+        return cls(data, as_residuals_allow(fit, training).joint_error, off, noise) if off > 0.0 else None
 
     def as_shown(self, fit: Fit) -> Fit:
         """Return the fit with parameters that are as uncertain as these readings show."""
-        some = replace(
-            self, data=self.data.of_configurations(np.arange(min(self.data.configurations, _CONFIGURATIONS)))
-        )
         of_one_size = replace(
             fit,
             covariance_parts=tuple(replace(part, freedom=math.inf) for part in fit.covariance_parts),
-            joint_freedom=np.full(len(fit.joint_error), np.inf),
+            joint_error=self.joint_error,
+            joint_freedom=np.full(len(self.joint_error), np.inf),
         )
-        by_parameters = PositionErrors(replace(of_one_size, joint_error=np.zeros(len(fit.joint_error))), _DRAWS)
-        lengths = some.seen(PositionErrors(of_one_size, _DRAWS))
+        by_parameters = PositionErrors(replace(of_one_size, joint_error=np.zeros(len(self.joint_error))), _DRAWS)
+        lengths = self.seen(PositionErrors(of_one_size, _DRAWS))
         medians = np.log(np.median(lengths, axis=1))
-        share = float(np.mean(some.moved(by_parameters) ** 2)) / float(np.mean(lengths**2))
+        share = float(np.mean(self.moved(by_parameters) ** 2)) / float(np.mean(lengths**2))
         share = min(max(share, _LEAST_SHARE), 1.0)
         square = (self.median / math.exp(float(medians.mean()))) ** 2
         level = max((square - 1.0 + share) / share, _LEAST_LEVEL)

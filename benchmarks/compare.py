@@ -119,9 +119,8 @@ DISTANCES = """
 ## Distances between all pairs of 9905 points
 
 truearm compares {pairs} distances with measured ones, and makes mean, deviation, maximum and a histogram of the errors,
-in {ours} on two cores and {alone} on one; SciPy's `pdist` makes one set of distances in {pdist} on one, into an array
-that is there already. The process with truearm takes {memory} at most, NumPy and SciPy included; `pdist` alone needs
-392 MB for each set.
+in {ours}; SciPy's `pdist` makes one set of distances in {pdist}, into an array that is there already. The process with
+truearm takes {memory} at most, NumPy and SciPy included; `pdist` alone needs 392 MB for each set.
 """
 
 
@@ -317,13 +316,9 @@ def page(record: dict[str, Any]) -> str:
     distances = ""
     if "pair_distances" in rounds[0]:
         all_pairs = ("pair_distances",)
-        for cores, key in (("one core", "one_core_seconds"), ("two cores", "seconds")):
-            share = over(all_pairs, lambda a, k=key: a["pdist_seconds"] / a[k])
-            goals.append(goal(f"49 million distances on {cores}: time of SciPy's pdist over truearm's", 1 / 1.5, share))
         distances = DISTANCES.format(
             pairs=f"{rounds[0]['pair_distances']['figures']['pairs']:,}".replace(",", " "),
             ours=shown(over(all_pairs, lambda a: a["seconds"])),
-            alone=shown(over(all_pairs, lambda a: a["one_core_seconds"])),
             pdist=shown(over(all_pairs, lambda a: a["pdist_seconds"])),
             memory=f"{(over(all_pairs, lambda a: a['memory']) or 0.0) / 1e6:.0f} MB",
         )

@@ -10,7 +10,6 @@ from scipy.spatial.distance import pdist
 from stopwatch import median_seconds, report
 
 import truearm
-from truearm.validation import distances as module
 from truearm.validation.distances import pair_distances
 
 rng = np.random.default_rng(0)
@@ -19,12 +18,9 @@ predicted = measured * 1.0003 + rng.normal(0, 2e-4, measured.shape)
 figures: dict[str, object] = {
     "pairs": pair_distances(predicted, measured).pairs,
     "seconds": median_seconds(lambda: pair_distances(predicted, measured), 5),
-    "threads": module._THREADS,
     # Of the whole process up to here, NumPy and SciPy included; pdist makes 392 MB after this [bytes].
     "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
 }
-module._THREADS = 1  # type: ignore[misc]
-figures["one_core_seconds"] = median_seconds(lambda: pair_distances(predicted, measured), 5)
 room = np.empty(len(measured) * (len(measured) - 1) // 2)
 figures["pdist_seconds"] = median_seconds(lambda: pdist(measured, out=room), 5)
 report(figures, {"truearm": truearm.__version__, "numpy": np.__version__, "scipy": scipy.__version__})

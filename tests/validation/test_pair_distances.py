@@ -64,20 +64,6 @@ def test_close_points_and_large_errors_are_as_right_as_others(size: float) -> No
     assert result.positive == pytest.approx((errors > 0).mean(), abs=1e-12)
 
 
-def test_results_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    predicted, measured = points(900, 7)
-    two = pair_distances(predicted, measured)
-    monkeypatch.setattr("truearm.validation.distances._THREADS", 1)
-    outcome = pair_distances(predicted, measured)
-    assert (outcome.mean, outcome.deviation, outcome.maximum, outcome.positive) == (
-        two.mean,
-        two.deviation,
-        two.maximum,
-        two.positive,
-    )
-    assert (outcome.counts == two.counts).all()
-
-
 def test_memory_is_bounded() -> None:
     predicted, measured = points(4000, 4)
     tracemalloc.start()

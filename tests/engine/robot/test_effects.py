@@ -232,9 +232,11 @@ def test_equilibrium_in_the_play_of_a_joint_is_a_root_of_its_equation(up: float)
 
 def test_tilts_under_their_own_loads_are_those_of_the_variables() -> None:
     robot = loaded_arm(("compliance", "bearing-compliance", "clearance"), 3)
-    variables = robot.variables(robot.random_configurations(100, np.random.default_rng(4)), robot.values)
+    q = robot.random_configurations(100, np.random.default_rng(4))
+    variables = robot.variables(q, robot.values)
     assert np.abs(variables[6:18]).max() > 1e-5
-    assert_allclose(robot.tilted(variables), variables, rtol=0, atol=1e-11)
+    for part, expected in zip(robot.tilted(variables, q.T), (variables, q.T), strict=True):
+        assert_allclose(part, expected, rtol=0, atol=1e-11)
 
 
 def test_variables_of_another_number_are_refused() -> None:

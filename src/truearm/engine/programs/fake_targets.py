@@ -23,7 +23,7 @@ from truearm.engine.robot.transform import homogeneous
 from truearm.engine.robot.ur_kinematics import controller_robot
 
 #: Poses looked at together: what is computed of them on the way stays in the processor's cache.
-AT_ONCE: Final = 5000
+AT_ONCE: Final = 20_000
 
 _OnBranch = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
 

@@ -279,27 +279,21 @@ class Robot(RobotData):
         """Return the variables ``(joints or more, n)`` of joints ``(joints, n)`` that turn and do nothing else."""
         return np.concatenate([joints, np.zeros((len(self.moving) - len(joints), *joints.shape[1:]))])
 
-    def tilted(self, variables: Array) -> Array:
-        """Return variables ``(joints or more, n)`` with the tilts that the loads of the arm make as it stands there.
+    @property
+    def tilts(self) -> bool:
+        """Whether some effect tilts joints, changes lengths or moves axes."""
+        return any(effect.tilts or effect.stretches or effect.shifts for effect in self.effects)
+
+    def tilted(self, variables: Array, joints: Array) -> tuple[Array, Array]:
+        """Return variables ``(joints or more, n)`` with the tilts of the arm as it stands there, and the joints behind.
 
         So with what lengths have grown and axes have moved where nothing but the joint positions is known. What was
-        tilted before counts for the loads alone; asked again for what came out, they are a thousandth nearer to
-        equilibrium.
+        tilted before counts for the loads alone, and the joint positions ``(joints, n)`` are those known so far; asked
+        again for what came out, both are a hundredth or less as far from equilibrium.
         """
-        tilting = [effect for effect in self.effects if effect.tilts or effect.stretches or effect.shifts]
-        if not tilting:
-            return variables
-        joints = variables[: len(self.joints)]
-        if any(effect.shifts for effect in tilting):  # which follow the joint positions
-            at = postures_behind(self, variables)
-        else:
-            at = carrying(self, Postures(joints.T), variables)
-        tilted = self.without_deflections(joints)
-        for effect in tilting:
-            for variable, part in effect.deflection(at, self.values).items():
-                if variable >= len(joints):
-                    tilted[variable] += part
-        return tilted
+        turned = variables[: len(self.joints)]
+        found = self.variables(carrying(self, Postures(joints.T), variables), self.values)
+        return np.concatenate([turned, found[len(turned) :]]), joints + turned - found[: len(turned)]
 
     def forward_kinematics(
         self, q: Array | Postures, target: str | None = None, values: Values | None = None

@@ -254,6 +254,8 @@ class BranchSearch:
         self._pool.add(every, self._joints[every, slot])
         # A seed that is nearly there is a start of its own: at its end a branch of the nominal arm may be missing.
         usable = np.flatnonzero(_missed(self._task, self._turned) < _USABLE_START)
+        if wanted is None:
+            usable = usable[self._pool.away()[usable] > _SEED_MISSED]
         self._pool.add(usable, self._turned[usable])
         missing = ~self._pool.satisfied(wanted)
         if missing.any():

@@ -113,29 +113,48 @@ class PoseTask:
 
     def variables(self, joints: Array) -> Array:
         """Return the variables ``(joints or more, n)`` of the arm with its joints ``(n, joints)`` turned so."""
-        return settled(lambda _, variables: self.robot.tilted(variables), self.robot.without_deflections(joints.T))
+        return self.standing(joints)[0]
 
-    def tilting(self, variables: Array) -> Array | None:
+    def standing(self, joints: Array) -> tuple[Array, Array]:
+        """Return these variables, and the joint positions behind them ``(joints, n)``."""
+        straight = self.robot.without_deflections(joints.T)
+        if not self.robot.tilts:
+            return straight, joints.T
+        count = len(straight)
+
+        def tilted(_: NDArray[np.intp], both: Array) -> Array:
+            return np.concatenate(self.robot.tilted(both[:count], both[count:]))
+
+        both = settled(tilted, np.concatenate([straight, joints.T]))
+        return both[:count], both[count:]
+
+    def tilting(self, variables: Array, behind: Array) -> Array | None:
         """Return how the tilts follow the joints, ``(tilts, joints, n)``, by differences; None if nothing tilts."""
         count = len(self.robot.joints)
         if len(variables) == count:
             return None
-        moved = np.repeat(variables[:, None, :], count + 1, axis=1)
+        moved, joints = (np.repeat(part[:, None, :], count + 1, axis=1) for part in (variables, behind))
         for i in range(count):
             moved[i, i] += _DIFFERENCE
-        tilts = self.robot.tilted(moved.reshape(len(variables), -1)).reshape(moved.shape)[count : 3 * count]
+            joints[i, i] += _DIFFERENCE
+        tilted, _ = self.robot.tilted(moved.reshape(len(variables), -1), joints.reshape(count, -1))
+        tilts = tilted.reshape(moved.shape)[count : 3 * count]
         return np.asarray((tilts[:, :count] - tilts[:, count:]) / _DIFFERENCE)
 
     def forward_kinematics(self, variables: Array) -> ForwardKinematics:
         """Run through the chain to the tip."""
         return self.robot.forward_kinematics_of(variables, self.target)
 
-    def advanced(self, variables: Array, step: Array) -> Array:
-        """Return the variables after a step ``(n, joints)`` of the joints, a sliding one's in reach lengths."""
+    def advanced(self, variables: Array, behind: Array, step: Array) -> tuple[Array, Array]:
+        """Return variables, and joint positions behind, after a step ``(n, joints)``, a sliding one's in reach lengths.
+
+        Without tilts nothing is asked of what is behind.
+        """
+        way = step.T.copy()
+        way[[joint.kind == "prismatic" for joint in self.robot.joints]] *= self.length
         moved = variables.copy()
-        for i, joint in enumerate(self.robot.joints):
-            moved[i] += step[:, i] * (self.length if joint.kind == "prismatic" else 1.0)
-        return self.robot.tilted(moved)
+        moved[: len(way)] += way
+        return self.robot.tilted(moved, behind + way) if self.robot.tilts else (moved, behind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +179,8 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False, most: int = MOST
             that is faster by far, and it ends anywhere if there is no solution.
         most: Steps at most.
     """
-    part, current = task, task.variables(starts)
+    part = task
+    current, behind = task.standing(starts)
     solution, damping = current.copy(), np.ones(len(starts))
     kinematics = part.forward_kinematics(current)
     e, jacobian = part.error(kinematics), part.jacobian(kinematics)
@@ -172,17 +192,20 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False, most: int = MOST
             (size > CONVERGED) & (gradient > _LEVEL_GRADIENT * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
         )
         if not going.all():
-            active, current, e, jacobian = active[going], current[:, going], e[going], jacobian[going]
+            active, current, behind = active[going], current[:, going], behind[:, going]
+            e, jacobian = e[going], jacobian[going]
             damping, size, part = damping[going], size[going], part.of(np.flatnonzero(going))
         if not len(active):
             break
-        tried = part.advanced(current, _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2))
+        step = _step(jacobian, e, _FLOOR + (0.0 if bold else damping) * size**2)
+        tried, tried_behind = part.advanced(current, behind, step)
         kinematics = part.forward_kinematics(tried)
         tried_error = part.error(kinematics)
         better = (np.linalg.norm(tried_error, axis=1) < size) | bold
         damping = np.where(better, np.maximum(damping / 5, _DAMPING[0]), damping * 10)
-        current, e = np.where(better, tried, current), np.where(better[:, None], tried_error, e)
-        tilting = part.tilting(tried) if number >= _STEPS_WITHOUT_TILTS else None
+        current, behind = np.where(better, tried, current), np.where(better, tried_behind, behind)
+        e = np.where(better[:, None], tried_error, e)
+        tilting = part.tilting(tried, tried_behind) if number >= _STEPS_WITHOUT_TILTS else None
         jacobian = np.where(better[:, None, None], part.jacobian(kinematics, tilting), jacobian)
         solution[:, active], error[active] = current, e
     return Solved(solution, error)

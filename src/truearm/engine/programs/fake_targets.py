@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 
 from truearm.engine.base.errors import InputError
 from truearm.engine.robot.chain import Array
-from truearm.engine.robot.inverse.branches import BRANCHES, branch_rule
-from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.inverse.branches import BRANCHES, BranchRule, branch_rule
+from truearm.engine.robot.inverse.kinematics import inverse, inverse_beside
 from truearm.engine.robot.inverse.pose_solver import JointSolutions, PoseStatus
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import homogeneous
 from truearm.engine.robot.ur_kinematics import controller_robot
 
 #: Poses looked at together: what is computed of them on the way stays in the processor's cache.
-AT_ONCE: Final = 20_000
+AT_ONCE: Final = 5000
+#: Where a joint moves farther from the nominal position [rad or m], the answer is looked for everywhere.
+_BESIDE: Final = 0.1
 
 _OnBranch = Callable[[JointSolutions, NDArray[np.intp]], NDArray[np.bool_]]
 
@@ -92,12 +94,34 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     Raises:
         InputError: If the robot is not calibrated or an array has the wrong shape.
     """
-    nominal = nominal_robot(robot)
-    rule = branch_rule(robot)
+    nominal, rule = nominal_robot(robot), branch_rule(robot)
+    parts = []
+    for first in range(0, len(flange), AT_ONCE):
+        rows = np.arange(first, min(first + AT_ONCE, len(flange)))
+        solutions = inverse_beside(robot, flange[rows, :3, 3], flange[rows, :3, :3], near[rows])
+        if rule is not None:
+            names = rule.numbers(nominal.forward_kinematics(solutions.joints))
+            solutions = replace(solutions, branch=tuple(BRANCHES[number] for number in names.tolist()))
+        parts.append((rows, solutions))
+    solutions = _merged(parts, len(flange))
+    far = np.abs(solutions.joints - near).max(axis=1) > _BESIDE
+    if rule is not None:
+        far |= solutions.branch != np.array(BRANCHES)[rule.numbers(nominal.forward_kinematics(near))]
+    left = np.flatnonzero(far | [status is not PoseStatus.REACHED for status in solutions.status])
+    parts = [(np.arange(len(flange)), solutions)]
+    for first in range(0, len(left), AT_ONCE):
+        rows = left[first : first + AT_ONCE]
+        parts.append((rows, _looked_for(robot, nominal, rule, flange[rows], near[rows])))
+    solutions = _merged(parts, len(flange))
+    return FakeTargets(matrices(nominal, solutions.joints), solutions)
+
+
+def _looked_for(robot: Robot, nominal: Robot, rule: BranchRule | None, flange: Array, near: Array) -> JointSolutions:
+    """Return joint positions for poses that are not reached beside those of the nominal robot, or all but singular."""
     position, rotation = flange[:, :3, 3], flange[:, :3, :3]
     joint_solutions = inverse(robot, position, rotation, seed=near)
     if rule is None:
-        return FakeTargets(matrices(nominal, joint_solutions.joints), joint_solutions)
+        return joint_solutions
     # The branch that counts is the controller's, of the nominal arm: next to a singular posture the calibrated arm may
     # call the same joints by another name. So the nearest joints are taken, and all branches looked through where they
     # are on another one.
@@ -131,9 +155,7 @@ def fake_targets(robot: Robot, flange: Array, near: Array) -> FakeTargets:
     branch = tuple(
         BRANCHES[number] for number in rule.numbers(nominal.forward_kinematics(joint_solutions.joints)).tolist()
     )
-    return FakeTargets(
-        matrices(nominal, joint_solutions.joints), replace(joint_solutions, status=tuple(status), branch=branch)
-    )
+    return replace(joint_solutions, status=tuple(status), branch=branch)
 
 
 def fake_targets_of(robots: Sequence[Robot], robot_of_row: NDArray[np.intp], flange: Array, near: Array) -> FakeTargets:
@@ -145,12 +167,10 @@ def fake_targets_of(robots: Sequence[Robot], robot_of_row: NDArray[np.intp], fla
     """
     fakes, parts = np.empty_like(flange), []
     for number in np.unique(robot_of_row).tolist():
-        members = np.flatnonzero(robot_of_row == number)
-        for first in range(0, len(members), AT_ONCE):
-            rows = members[first : first + AT_ONCE]
-            fake = fake_targets(robots[number], flange[rows], near[rows])
-            fakes[rows] = fake.flange
-            parts.append((rows, fake.solutions))
+        rows = np.flatnonzero(robot_of_row == number)
+        fake = fake_targets(robots[number], flange[rows], near[rows])
+        fakes[rows] = fake.flange
+        parts.append((rows, fake.solutions))
     return FakeTargets(fakes, _merged(parts, len(flange)))
 
 

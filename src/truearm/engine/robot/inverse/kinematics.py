@@ -43,6 +43,8 @@ NEAR_SINGULAR: Final = 5e-3
 _SPREAD_AROUND_SEED: Final = 0.3
 _ROUNDS: Final = 4
 _STARTS_A_ROUND: Final = 4
+#: Steps at most to a pose beside its seed: five are enough for nearly all.
+_STEPS_BESIDE: Final = 10
 
 
 def inverse(
@@ -112,6 +114,19 @@ def inverse(
             cure="Named branches need six turning joints with a closed form, and the whole orientation.",
         )
     return _by_starts(task, near, turned)
+
+
+def inverse_beside(robot: Robot, positions: Array, rotations: Array, seed: Array) -> JointSolutions:
+    """Return what steps from the seeds lead to, for poses of the flange in the robot's base frame.
+
+    A fraction of the work of :func:`inverse`, and as good where a pose is reached beside its seed and away from
+    singular postures; nothing is looked for elsewhere.
+    """
+    task = _task(robot, positions, rotations, None, "base", "full")
+    near, turned = _seed(robot, seed, len(positions))
+    pool = Candidates(task, near, branch_rule(robot))
+    pool.add(np.arange(len(near)), turned, most=_STEPS_BESIDE)
+    return _answer(task, pool, pool.best(None), None)
 
 
 # -- by starts --------------------------------------------------------------------------------------------

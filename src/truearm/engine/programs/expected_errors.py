@@ -283,14 +283,15 @@ class _ModelErrors:
         return {number: common_motion(self._motions_in(programs, number)) for number in sorted(numbers)}
 
     def _motions_in(self, programs: Sequence[TargetsReached], number: int) -> Iterator[tuple[Array, Array, Array]]:
-        for targets in programs:
-            for rows in _parts(targets):
-                members = rows[(targets.frames[rows] == number) & targets.alone[rows]]
-                if len(members):
-                    # A frame takes up what is wrong with the arm at rest; what acts on the tool moves no frame.
-                    robot = targets.arms[targets.arm[members[0]]].with_wrench(None)
-                    moved, turned, tips = self._motions(robot, targets.joints[members], targets.tips[members])
-                    yield tips, moved, turned
+        sharing = [(targets.frames == number) & targets.alone for targets in programs]
+        every = -(-sum(map(np.count_nonzero, sharing)) // _AT_ONCE)  # as the base is found by some of them
+        for targets, shares in zip(programs, sharing, strict=True):
+            some = targets.some(np.flatnonzero(shares)[::every])
+            for rows in _parts(some):
+                # A frame takes up what is wrong with the arm at rest; what acts on the tool moves no frame.
+                robot = some.arms[some.arm[rows[0]]].with_wrench(None)
+                moved, turned, tips = self._motions(robot, some.joints[rows], some.tips[rows])
+                yield tips, moved, turned
 
     def _motions(self, robot: Robot, q: Array, tip: Array) -> tuple[Array, Array, Array]:
         """Return motions and turns of tips ``(m, 3, numbers)``, and the tips ``(m, 3)``, in the world."""
@@ -303,7 +304,7 @@ class _ModelErrors:
         on_flange, is_target = self._tips_on_flange(tip)
         moved = moved + R @ np.where(is_target, on_flange, self._flange[:3])
         turned = turned + R @ np.where(is_target, 0.0, self._flange[3:])
-        return moved + np.cross(turned, arm[:, :, None], axis=-2), turned, kinematics.position.T + arm
+        return moved + np.cross(arm[:, None, :], np.eye(3)) @ turned, turned, kinematics.position.T + arm
 
     def _tips_on_flange(self, tips: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return by what targets of the calibration at tips are uncertain on the identified flange, and which are such.

@@ -49,9 +49,6 @@ BOLD_STEPS: Final = 20
 STEPS_OF_MANY: Final = 30
 #: Steps before the change of tilts is foreseen; without tilts nearly all poses are met by then.
 _STEPS_WITHOUT_TILTS: Final = 8
-#: Steps after which an error that is still above this share of what it was will not become small.
-_PATIENCE: Final = 10
-_STUCK: Final = 0.99
 #: Of joints, to find how the tilts follow them [rad, m].
 _DIFFERENCE: Final = 1e-6
 _DAMPING: Final = (1e-6, 1e12)
@@ -187,18 +184,15 @@ def solve(task: PoseTask, starts: Array, *, bold: bool = False, most: int = MOST
     solution, damping = current.copy(), np.ones(len(starts))
     kinematics = part.forward_kinematics(current)
     e, jacobian = part.error(kinematics), part.jacobian(kinematics)
-    error, active, earlier = e.copy(), np.arange(len(starts)), np.full(len(starts), np.inf)
+    error, active = e.copy(), np.arange(len(starts))
     for number in range(most):
         size = np.linalg.norm(e, axis=1)
         gradient = np.linalg.norm((jacobian * e[:, :, None]).sum(1), axis=1)
         going = (
             (size > CONVERGED) & (gradient > _LEVEL_GRADIENT * size * np.minimum(size, 1.0)) & (damping < _DAMPING[1])
         )
-        if number % _PATIENCE == 0 and not bold:
-            going &= size < _STUCK * earlier
-            earlier = size
         if not going.all():
-            active, earlier, current, behind = active[going], earlier[going], current[:, going], behind[:, going]
+            active, current, behind = active[going], current[:, going], behind[:, going]
             e, jacobian = e[going], jacobian[going]
             damping, size, part = damping[going], size[going], part.of(np.flatnonzero(going))
         if not len(active):

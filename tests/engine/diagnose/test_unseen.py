@@ -73,7 +73,7 @@ def level(data: Dataset) -> float:
 
 
 def test_parameters_are_as_uncertain_as_unseen_readings_show() -> None:
-    levels = {times: np.median([level(read(times, seed)) for seed in range(9)]) for times in (0.3, 1.0, 3.0)}
+    levels = {times: np.median([level(read(times, seed)) for seed in range(5)]) for times in (0.3, 1.0, 3.0)}
     assert levels[0.3] < 0.6
     assert levels[1.0] == pytest.approx(1.0, abs=0.4)
     assert 4.0 < levels[3.0] < 14.0
@@ -123,7 +123,7 @@ def test_deviations_of_parameters_follow() -> None:
     assert shown.robot.values == fit.robot.values
 
 
-@pytest.mark.parametrize("times", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("times", [0.5, 2.0])
 def test_draws_that_contradict_unseen_readings_do_not_count(times: float) -> None:
     _, fit = campaign()
     wide, narrow = [], []

@@ -16,6 +16,8 @@ from truearm.engine.programs.fake_targets import fake_targets, matrices, nominal
 from truearm.engine.programs.gauge import best_agreement
 from truearm.engine.programs.program import Configuration
 from truearm.engine.programs.resolved_configurations import resolved_configurations
+from truearm.engine.robot.inverse.kinematics import inverse
+from truearm.engine.robot.inverse.pose_solver import PoseStatus
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.robot import Robot
@@ -55,6 +57,24 @@ def test_the_calibrated_robot_goes_where_the_nominal_one_was_meant(name: str) ->
     turned = np.array(Rotation.from_matrix(np.swapaxes(rotation, 1, 2) @ base.rotation @ wanted[:, :3, :3]).magnitude())
     assert turned[usable].max() < 1e-8
     assert np.linalg.norm(result.flange[:, :3, 3] - wanted[:, :3, 3], axis=1)[usable].mean() > 5e-4
+
+
+def test_answers_are_those_of_the_whole_search() -> None:
+    """Of an arm whose axes tilt and move, near the poses of the nominal one."""
+    robot = worn(load_robot("irb120"))
+    robot = robot.with_effects(["compliance", "bearing-compliance", "run-out"]).with_values(robot.values)
+    rng = np.random.default_rng(5)
+    moved = {p.name: 3e-5 * rng.standard_normal() for p in robot.parameters.values() if p.group == "run-out"}
+    robot = robot.with_values(moved | {f"bearing_compliance_{i}": 1e-5 for i in range(1, 7)})
+    near = 0.8 * robot.random_configurations(300, rng)
+    wanted = matrices(nominal_robot(robot), near)
+    found = fake_targets(robot, wanted, near).solutions
+    searched = inverse(robot, wanted[:, :3, 3], wanted[:, :3, :3], seed=near)
+    both = found.usable & searched.usable
+    assert both.mean() > 0.85  # some stretched arms do not reach as far
+    np.testing.assert_allclose(found.joints[both], searched.joints[both], atol=1e-9)
+    reached = [status is not PoseStatus.UNREACHABLE for status in searched.status]
+    assert [status is not PoseStatus.UNREACHABLE for status in found.status] == reached
 
 
 @pytest.fixture(scope="module", params=["elastic", "full"])

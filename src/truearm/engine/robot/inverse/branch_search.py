@@ -252,7 +252,8 @@ class BranchSearch:
         every = np.arange(len(cost))
         slot = np.argmin(cost, axis=1)
         self._pool.add(every, self._joints[every, slot])
-        # A seed that is nearly there is a start of its own: at its end a branch of the nominal arm may be missing.
+        # A seed that is nearly there is a start of its own: at its end a branch of the nominal arm may be missing. What
+        # lies beside it already is what it would lead to.
         usable = np.flatnonzero(_missed(self._task, self._turned) < _USABLE_START)
         if wanted is None:
             usable = usable[self._pool.away()[usable] > _SEED_MISSED]

@@ -55,7 +55,7 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
         default=None,
         shown=f"auto where loads are known or {ENOUGH} configurations are trained on, else geometric",
         more="It is ``geometric`` too with `effects`, `zones`, `monte_carlo`, a `redundancy` other than ``prior``, and "
-        "where readings are lengths or of fixtures. "
+        "where readings are lengths or of fixtures, or an error of the data is told. "
         "``auto`` chooses nothing: what the training part does not support shrinks to nothing.",
     )
     loss: Loss = option(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from truearm.calibration.holding import fixed_places_argument
 from truearm.calibration.result import RESULT_FILES, Calibration
 from truearm.calibration.zones import WantedZones, choose_zones, zone_file_names, zones_argument
-from truearm.engine.base.errors import InputError, Notice, Rule, listed, refusals_of
+from truearm.engine.base.errors import InputError, Notice, Rule, has_error, listed, refusals_of
 from truearm.engine.base.files import path_argument, read_bytes
 from truearm.engine.base.manifest import hash_of
 from truearm.engine.base.version import __version__
@@ -322,6 +322,8 @@ def _split(asked: Calibrate, read: _Read) -> _Parts:
             read.robot, steady, training, asked.base_changes, model or GEOMETRIC, asked.loss, read.fixed
         )
     noticed = notices_of(readings, read.robot, steady=steady, excluded=count_excluded(excluded))
+    if model is None and asked.model is None and has_error(noticed):  # its result is not to be used, whatever the model
+        model, because = GEOMETRIC, "the data have an error"
     first = steady.of_configurations(training)
     second = steady.of_configurations(held_out) if len(held_out) else None
     return _Parts(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from truearm.engine.base.errors import InputError, Notice, listed
+from truearm.engine.base.errors import InputError, Notice, has_error, listed
 from truearm.engine.base.units import Marked, parts_of
 from truearm.engine.command.arguments import (
     data_argument,
@@ -18,6 +18,7 @@ from truearm.engine.command.arguments import (
 from truearm.engine.command.reading import count_excluded, excluded_notices, without_excluded
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
+from truearm.engine.diagnose.changes import notices_of_change, what_moved
 from truearm.engine.diagnose.data_check import compared_with
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.diagnose.next_steps import steps_after_check
@@ -75,5 +76,8 @@ def checked(asked: Check) -> DataCheck:
     noticed, marks = (*noticed, *excluded_notices(excluded)), parts_of((measured, against))
     if fit is None or part is None:
         return DataCheck(measured, noticed, steps_after_check(noticed, robot=against is not None), marks)
-    steps = steps_after_check(noticed, LeftOver.of(fit, part), errors_of(fit.robot, part))
-    return DataCheck(measured, noticed, steps, marks)
+    left = LeftOver.of(fit, part)
+    moved = None if has_error(noticed) else what_moved(left)
+    if moved is not None:
+        noticed = (*noticed, *notices_of_change(*moved))
+    return DataCheck(measured, noticed, steps_after_check(noticed, left, errors_of(fit.robot, part), moved), marks)

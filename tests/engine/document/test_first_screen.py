@@ -55,9 +55,9 @@ def test_text_and_json_are_made_of_the_same_blocks() -> None:
 
 def test_details_notices_and_steps_that_are_left_out_are_counted() -> None:
     assert first_screen(Found(1, NOTICES, STEPS)) == [
+        "Error (c): third.",  # before the figures that it is about
         *("answer 0", "explained", "at length"),  # for which there is room
         "Next (measure): Measure more.",
-        "Error (c): third.",
         "Warning (b): second.",
         "Warning (d): fourth.",
         "And 1 warning, 2 notes, 4 lines more, which `details` shows.",

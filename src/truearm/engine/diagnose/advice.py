@@ -7,6 +7,7 @@ from itertools import combinations
 from typing import Final
 
 from truearm.engine.base.errors import Notice, Rule, listed
+from truearm.engine.diagnose.changes import OF_CHANGES
 from truearm.engine.diagnose.expected_error import ExpectedError
 from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA
 from truearm.engine.fit.fit import Fit, Status
@@ -50,18 +51,19 @@ REDUNDANT: Final = Rule(
 )
 RESIDUALS_EXCEED_SIGMA: Final = Rule(
     "residuals-exceed-sigma",
-    "warning",
-    "the robot does more than the model, or sigma is too small",
-    unless=frozenset({PULLED_AWAY}),
+    ("warning", "note"),
+    "the robot does more than the model, or sigma is too small; a note where the next steps say what explains it",
+    unless=OF_CHANGES | {PULLED_AWAY, WRONG_DATA},
 )
 URDF_PARTIAL: Final = Rule("urdf-partial", "note", "what the URDF could not hold")
 
 
-def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
+def check_fit(fit: Fit, expected: ExpectedError, *, explained: bool = False) -> list[Notice]:
     """Return what a fit says about its model, its data and its parameters.
 
     Args:
         expected: Of the fit, over the workspace.
+        explained: Whether it is known what the model lacks.
     """
     notices = _parallel_axes(fit)
     if fit.status is Status.NOT_CONVERGED:
@@ -114,7 +116,8 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
                 f"The residuals are {fit.excess:.1f} times what the declared deviations"
                 f"{', and errors of the joints that readings of a configuration share,' if shared else ''} allow. "
                 f"Either the robot does something that the {fit.model.name} model cannot express, or sigma is too "
-                "small, or readings are wrong. The deviations of the parameters allow for it."
+                "small, or readings are wrong. The deviations of the parameters allow for it.",
+                "note" if explained else "warning",
             )
         )
     notices += _check_effects(fit)

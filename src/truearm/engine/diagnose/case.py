@@ -18,7 +18,7 @@ from truearm.engine.diagnose.far_off import PULLING
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
 from truearm.engine.diagnose.off_configurations import Off, off_configurations
 from truearm.engine.diagnose.position_errors import as_residuals_allow
-from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA, LeftOver
+from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA, Explanation, LeftOver, explanation
 from truearm.engine.diagnose.unseen import Unseen
 from truearm.engine.diagnose.visits import check_sigma, check_sigma_beside_joints
 from truearm.engine.diagnose.wrong_robot import (
@@ -79,9 +79,14 @@ class Case:
         return off_configurations(self.left)
 
     @cached_property
+    def lacking(self) -> Explanation | None:
+        """What would explain what the fit leaves."""
+        return explanation(self.left, self.off.indices)
+
+    @cached_property
     def moved(self) -> tuple[LeftOver, Change] | None:
         """What moved during the campaign."""
-        return what_moved(self.left_by_few, self.off)
+        return what_moved(self.left_by_few)
 
     @cached_property
     def changes(self) -> list[Notice]:

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.engine.base.errors import Notice, Rule
-from truearm.engine.diagnose.off_configurations import Off
-from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail
+from truearm.engine.diagnose.off_configurations import Off, off_configurations
+from truearm.engine.diagnose.unmodelled import LeftOver, chi_squared_tail, without_bending
 from truearm.engine.robot.chain import Array
 
 Kind = Literal["instrument-moved", "target-moved", "joint-zero-jumped", "drift"]
@@ -211,12 +211,16 @@ def _judged(
     return criterion, Change(kind, subject, first, share, tuple((-values).tolist()), chance)
 
 
-def what_moved(left: LeftOver, off: Off) -> tuple[LeftOver, Change] | None:
+def what_moved(left: LeftOver) -> tuple[LeftOver, Change] | None:
     """Return what a fit leaves without configurations that are off one by one, and what moved during the others.
 
-    A single configuration that is far off looks like something that moved. Nothing is returned where nothing moved.
+    What the geometry and joints that give way could take up is taken out first, whatever the fit had of it: it hides
+    what moved. A single configuration that is far off looks like something that moved. Nothing is returned where
+    nothing moved.
     """
-    remaining = left.without(() if is_a_part(off) else off.indices)
+    wider = without_bending(left)
+    off = off_configurations(wider)
+    remaining = wider.without(() if is_a_part(off) else off.indices)
     change = find_change(remaining)
     return None if change is None else (remaining, change)
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import Notice, Rule, counted
+from truearm.engine.base.errors import Level, Notice, Rule, counted
 from truearm.engine.base.units import SHOWN_AS, from_si
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
@@ -32,7 +32,7 @@ from truearm.engine.robot.parameters import PLACES
 
 FEW_READINGS: Final = Rule(
     "few-readings",
-    ("warning", "error"),
+    ("note", "warning", "error"),
     "hardly more numbers were read than the parameters take up: [more](results.md#the-expected-error)",
     gravity=2,
 )
@@ -53,21 +53,25 @@ _UNIT: Final = {observation.name: "mm" if observation.unit == "m" else "mrad" fo
 def check_few_readings(fit: Fit) -> list[Notice]:
     """Say if a fit leaves next to nothing of its readings, whatever their noise.
 
-    It is an error for losses other than the linear one, whose deviations follow from what is left.
+    It is a warning where the noise is assumed besides, and an error for losses other than the linear one, whose
+    deviations follow from what is left.
     """
     left = max(fit.numbers - fit.spent, 0.0)
     enough = max(_ENOUGH, _LEAST_SHARE * fit.numbers) if fit.loss in _MEETING else _ENOUGH
-    if left >= enough and not fit.assumed:
+    few = left < enough
+    if not few and not fit.assumed:
         return []
-    words = (
-        f"The training readings are {counted(fit.numbers, 'number')}. The {counted(len(fit.free.names), 'parameter')} "
-        f"take up {fit.spent:.1f} of them, so {left:.1f} are left to judge the fit by. A wrong reading cannot be told "
-        "from a right one. "
-    )
+    words = ""
+    if few:
+        words = (
+            f"The training readings are {counted(fit.numbers, 'number')}. The "
+            f"{counted(len(fit.free.names), 'parameter')} take up {fit.spent:.1f} of them, so {left:.1f} are left to "
+            "judge the fit by. A wrong reading cannot be told from a right one. "
+        )
     if fit.assumed:
         taken = ", ".join(f"{from_si(fit.sigma[name], _UNIT[name]):.3g} {_UNIT[name]} ({name})" for name in fit.assumed)
         words += (
-            f"Nor do the readings tell how large their noise is, and no deviation is declared: it is assumed, {taken}. "
+            f"The readings do not tell how large their noise is, and no deviation is declared: it is assumed, {taken}. "
             "The deviations of the parameters and the expected error are right if it is. "
         )
     elif not fit.declared:
@@ -81,7 +85,8 @@ def check_few_readings(fit: Fit) -> list[Notice]:
             "they follow from what is left. Use the linear loss. "
         )
     declare = "" if fit.declared else " Declare the instrument's deviation in a column sigma."
-    return [FEW_READINGS(f"{words}{CURE}{declare}", "warning" if fit.loss == "linear" else "error")]
+    level: Level = "error" if fit.loss != "linear" else "warning" if few and fit.assumed else "note"
+    return [FEW_READINGS(f"{words}{CURE}{declare}", level)]
 
 
 def _may_be(freedom: float) -> float:

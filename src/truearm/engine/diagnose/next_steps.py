@@ -17,7 +17,7 @@ import numpy as np
 from truearm.engine.base.errors import Notice, counted, listed
 from truearm.engine.data.statistics import Errors
 from truearm.engine.diagnose.case import Case
-from truearm.engine.diagnose.changes import Change, is_a_part, what_moved
+from truearm.engine.diagnose.changes import Change, is_a_part
 from truearm.engine.diagnose.curves import about_curves, has_curves
 from truearm.engine.diagnose.far_off import ORIENTATION_OUTLIERS
 from truearm.engine.diagnose.gain import NO_GAIN, WORSE
@@ -32,13 +32,15 @@ from truearm.engine.diagnose.next_step import MOST, NextStep, most_useful_first
 from truearm.engine.diagnose.off_configurations import Off, OffConfiguration, off_configurations
 from truearm.engine.diagnose.unmodelled import (
     GEOMETRY,
+    HIDING,
+    LIKELY,
     LOADS,
     PAYLOAD,
     Explanation,
     LeftOver,
     can_explain,
     explanation,
-    with_causes,
+    without_bending,
 )
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.chain import Array
@@ -144,10 +146,6 @@ _AT_THE_NOISE: Final = 1.3
 _OF_THE_JOINTS: Final = 0.5
 #: Mean length of three normal coordinates over the deviation of one.
 _LENGTH: Final = 2.0 * math.sqrt(2.0 / math.pi)
-#: Share of the squares that a change must explain to be told before the model has what it lacks.
-_LEAST_SHARE: Final = 0.5
-#: Share that an effect leaves, as a root mean square, from which on it hides no more what else is wrong.
-_HIDING: Final = 0.7
 #: Steps to a model that has what the present one lacks, and how many times as much as by other steps must be gained by
 #: them for the others to come after.
 _ANOTHER_MODEL: Final = frozenset({"other-model", "give-loads", "give-payload"})
@@ -199,7 +197,7 @@ def steps_after_fit(case: Case, notices: Sequence[Notice]) -> tuple[NextStep, ..
     if first:
         return tuple(first)
     left, known = case.left, _known(case.errors)
-    steps, remaining = _of_left_over(left, case.off, case.moved, known, checked=False)
+    steps, remaining = _of_left_over(left, case.off, case.moved, case.lacking, known, checked=False)
     bound = _at_bound(case, remaining)
     spoiled = (
         case.moved is not None
@@ -216,19 +214,25 @@ def steps_after_fit(case: Case, notices: Sequence[Notice]) -> tuple[NextStep, ..
         more = NextStep("measure-more", _where_to_measure(case, f"determine {listed(left.fit.unobservable)}"))
         return (more, *most_useful_first(steps))[:MOST]
     if any(notice.code == FEW_READINGS.code for notice in notices):
-        more = NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters take up.")
+        more = NextStep("measure-more", CURE)
         return (more, *most_useful_first(step for step in steps if step.code != more.code))[:MOST]
     return most_useful_first(steps or [_end(left, case.training.configurations)])
 
 
 def steps_after_check(
-    notices: Sequence[Notice], left: LeftOver | None = None, errors: Errors | None = None, *, robot: bool = True
+    notices: Sequence[Notice],
+    left: LeftOver | None = None,
+    errors: Errors | None = None,
+    moved: tuple[LeftOver, Change] | None = None,
+    *,
+    robot: bool = True,
 ) -> tuple[NextStep, ...]:
     """Return at most three things to do after a check, the most useful first; one at least.
 
     Args:
         left: What a robust geometric fit leaves of the readings; None without one.
         errors: Of that fit.
+        moved: What moved during the campaign.
         robot: Whether the data were compared with a robot.
     """
     fix = _to_fix(notices)
@@ -237,13 +241,14 @@ def steps_after_check(
     steps: list[NextStep] = []
     if left is not None and errors is not None:
         off = off_configurations(left)
-        steps, _ = _of_left_over(left, off, what_moved(left, off), _known(errors), checked=True)
+        lacking = explanation(left, off.indices)
+        steps, _ = _of_left_over(left, off, moved, lacking, _known(errors), checked=True)
     steps += _cures(notices, steps)
     if any(notice.code == FEW_READINGS.code for notice in notices):
-        steps.append(NextStep("measure-more", f"{CURE} The readings are hardly more numbers than the parameters are."))
+        steps.append(NextStep("measure-more", CURE))
     elif not robot:
         steps.append(NextStep("check-robot", "Check them together with the nominal robot too."))
-    elif not any(step.code in ("other-model", "give-loads") for step in steps):
+    elif moved is None and not any(step.code in ("other-model", "give-loads") for step in steps):
         explainable = left is not None and can_explain(left)
         also = " No joint effect would explain more of the readings." if explainable else ""
         steps.append(NextStep("calibrate", f"Calibrate the robot.{also}"))
@@ -251,31 +256,34 @@ def steps_after_check(
 
 
 def _of_left_over(
-    left: LeftOver, off: Off, moved: tuple[LeftOver, Change] | None, known: float, *, checked: bool
+    left: LeftOver,
+    off: Off,
+    moved: tuple[LeftOver, Change] | None,
+    candidate: Explanation | None,
+    known: float,
+    *,
+    checked: bool,
 ) -> tuple[list[NextStep], float]:
-    """Return what to do about what a fit leaves, and the error without configurations that are off [m]."""
-    candidate = explanation(left, off.indices)
-    share, wider, known_moved = 1.0, left, known
-    if candidate is not None and (off.configurations or candidate.left < _HIDING):
+    """Return what to do about what a fit leaves, and the error without configurations that are off [m].
+
+    Args:
+        candidate: What would explain what is left.
+    """
+    share, known_moved = 1.0, known
+    if candidate is not None and (off.configurations or candidate.left < HIDING):
         # What a model lacks may be large at a few configurations, which are then not wrong, and hide others that are.
-        wider = with_causes(left, GEOMETRY, "compliance", LOADS, candidate.cause)
-    if candidate is not None and wider is not left:
-        still = off_configurations(wider)
+        still = off_configurations(without_bending(left, candidate.cause))
         share = 1.0 if off.configurations else candidate.left
         if set(still.indices) - set(off.indices):
             candidate = explanation(left, still.indices) or candidate
         off = still
-        if moved is None:
-            moved = what_moved(wider, off)
-            # Small changes are told by the next fit, which has what this one lacks.
-            moved = None if moved is None or moved[1].share < _LEAST_SHARE else moved
-            known_moved = known * candidate.left if candidate is not None else known
+        known_moved = known * candidate.left
     is_moved = moved is not None and is_a_part(off)
     steps = [] if is_moved else measured_again(left, off, known * share, checked=checked)
     remaining = known * off.left
     if moved is not None:
         steps.append(about_change(*moved, known_moved * off.left))
-    if candidate is not None:
+    if candidate is not None and (moved is None or candidate.cause in LIKELY):  # what moved looks like an effect, too
         steps.append(other_model(left.fit, candidate, remaining))
     return steps, remaining
 

@@ -35,7 +35,7 @@ from truearm.engine.diagnose.far_off import (
     without_orientations,
 )
 from truearm.engine.diagnose.narrow_data import check_few_to_doubt
-from truearm.engine.diagnose.unmodelled import LeftOver
+from truearm.engine.diagnose.unmodelled import HIDING, LeftOver, explanation
 from truearm.engine.diagnose.visits import VisitLikelihood, joints_as_far_off
 from truearm.engine.diagnose.wrong_robot import check_plausible, check_robot, other_robot
 from truearm.engine.fit.fit import Fit, identify, place
@@ -262,7 +262,10 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
         alone = turned & ~(np.nan_to_num(off) > allowed_off(off))
         mistaken, suspects = far_off(fit, data, off, turned)
         suspects += exchanged
-        doubted = [*mistaken, *check_orientations(fit, data, errors, alone), *often_off(data, off)]
+        doubted = [*mistaken, *check_orientations(fit, data, errors, alone)]
+        often = often_off(data, off)
+        if often and not _gives_way(fit, data):
+            doubted += often
         turned = alone
     return Comparison(
         [*wrong, *notices, *doubted, *_one_point(fit, data), *check_rounding(fit, data), *_computed(robot, data, off)],
@@ -308,6 +311,12 @@ BEYOND_LIMITS: Final = Rule(
 )
 
 
+def _gives_way(fit: Fit, data: Dataset) -> bool:
+    """Return whether an effect explains much of what a robust fit leaves, which meets half of the readings."""
+    found = explanation(LeftOver.of(fit, data))
+    return found is not None and found.left < HIDING
+
+
 def _beyond_limits(robot: Robot, data: Dataset) -> list[Notice]:
     words, beyond = [], np.zeros(data.configurations, dtype=bool)
     for i, joint in enumerate(robot.joints):
@@ -344,7 +353,7 @@ def _far_from_fixtures(fit: Fit, data: Dataset) -> tuple[list[Notice], list[Susp
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed_off(off)).tolist()
     places = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
     suspects = [Suspect(OUTLIERS, *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, places, strict=True)]
-    return _unlike_its_readings(fit, data), suspects
+    return [] if _gives_way(fit, data) else _unlike_its_readings(fit, data), suspects
 
 
 FIXTURE_MISPLACED: Final = Rule(

@@ -28,6 +28,7 @@ from truearm.engine.fit.every_effect import open_effects
 from truearm.engine.fit.fit import Fit
 from truearm.engine.fit.problem import Problem
 from truearm.engine.robot.chain import Array
+from truearm.engine.robot.effects.compliance import Compliance
 from truearm.engine.robot.effects.fourier import Fourier
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.loads import has_weight, joint_loads
@@ -164,6 +165,9 @@ _LEAST_SHARE: Final = 0.5
 #: A cause that is more likely beforehand is preferred if it gains so large a share of what the best one does. Every arm
 #: gives way, and what else it does is seen better after that.
 _AS_GOOD: Final = {GEOMETRY: 0.5, "compliance": 0.5, LOADS: 0.85, PAYLOAD: 0.85}
+LIKELY: Final = frozenset(_AS_GOOD)
+#: Share that an effect leaves, as a root mean square, from which on it hides no more what else is wrong.
+HIDING: Final = 0.7
 #: No arm carries more than this share of its own mass; where more comes out, its mass is not told.
 _LARGEST_PAYLOAD: Final = 0.7
 _STEPS: Final = 30
@@ -210,6 +214,15 @@ def with_causes(left: LeftOver, *causes: str) -> LeftOver:
     columns = left.without_parameters(J)
     U, s, _ = np.linalg.svd(columns, full_matrices=False)
     return replace(left, basis=np.concatenate([left.basis, U[:, s > 1.0]], axis=1))
+
+
+def without_bending(left: LeftOver, *causes: str) -> LeftOver:
+    """Return what a fit leaves when geometry and joints that give way have taken what they can, whatever loads them.
+
+    Args:
+        causes: What may take its part besides.
+    """
+    return with_causes(left, GEOMETRY, Compliance.name, LOADS, *causes)
 
 
 @dataclass(frozen=True, eq=False)

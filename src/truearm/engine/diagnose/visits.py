@@ -12,7 +12,7 @@ from truearm.engine.base.errors import Notice, Rule
 from truearm.engine.base.units import from_si
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
-from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver, chi_squared_tail
+from truearm.engine.diagnose.unmodelled import WRONG_DATA, LeftOver, chi_squared_tail, without_bending
 from truearm.engine.fit.likelihood import Linearised, Visits
 from truearm.engine.fit.rounds import DECLARED, factors_of
 from truearm.engine.fit.variance_components import Variances, largest_likelihood
@@ -152,6 +152,10 @@ _LEAST_OF_ONE_SIGN: Final = 2 / 3
 _LARGEST_CHANCE: Final = 1e-3
 
 
+#: A joint that moves the readings by a smaller share than others do has no lag that could be told.
+_HARDLY_SEEN: Final = 1e-3
+
+
 @dataclass(frozen=True, eq=False)
 class ApproachLag:
     """What the approach direction explains."""
@@ -166,14 +170,13 @@ class ApproachLag:
     @property
     def fires(self) -> bool:
         """Whether it explains at least 5 %, more than chance, with one sign on most joints."""
-        positive = int((self.lags > 0).sum())
-        same = max(positive, len(self.lags) - positive)
+        same = max(int((self.lags > 0).sum()), int((self.lags < 0).sum()))
         is_large = self.share >= _LEAST_EXPLAINED and self.chance < _LARGEST_CHANCE
         return is_large and same > _LEAST_OF_ONE_SIGN * len(self.lags)
 
 
 def approach_lag(left_over: LeftOver) -> ApproachLag | None:
-    """Return what approach directions explain of the residuals of a fit.
+    """Return what approach directions explain of the residuals of a fit, beyond what joints that give way could.
 
     None where too few readings are left, or where the order of measurement is not known.
     """
@@ -181,13 +184,14 @@ def approach_lag(left_over: LeftOver) -> ApproachLag | None:
     asked = left_over.asked
     if data.number is None or asked.number is None:
         return None
+    left_over = without_bending(left_over)
     evaluation = problem.at(np.array([problem.robot.values[name] for name in problem.free.names]))
     H = evaluation.by_joints * _last_moves(asked, asked.number)[left_over.chosen][left_over.configuration]
     free = left_over.freedom
     if free < 4 * H.shape[1]:
         return None
     left, moved = left_over.without_parameters(left_over.residual), left_over.without_parameters(H)
-    lags = np.asarray(np.linalg.lstsq(moved, left, rcond=1e-10)[0], dtype=np.float64)
+    lags = np.asarray(np.linalg.lstsq(moved, left, rcond=_HARDLY_SEEN)[0], dtype=np.float64)
     before = float(left @ left) / free
     after = float(np.sum((left - moved @ lags) ** 2)) / (free - H.shape[1])
     share = 1.0 - after * (free - H.shape[1]) / (before * free) if before > 0 else 0.0

@@ -63,15 +63,20 @@ class Record:
         raise NotImplementedError
 
     def everything(self) -> list[Block]:
-        """Return its blocks, then what to do next and what to know, as a result has it that holds this one."""
-        parts = self.simulated_from
+        """Return errors, its blocks, what to do next and what else to know, as a result has it that holds this one."""
+        parts, dangers = self.simulated_from, self._notices(error=True)
         blocks: list[Block] = [say(simulated=True, simulated_parts=[*parts])] if parts else []
-        blocks += self.blocks()
+        blocks += [say(*notice_lines(dangers)), *self.blocks()]
         if hasattr(self, "next"):
             blocks.append(detail(*(step.line for step in self.next), next=[step.summary() for step in self.next]))
         if hasattr(self, "warnings"):
-            blocks.append(detail(*notice_lines(self.warnings), warnings=notice_summaries(self.warnings)))
+            rest = notice_lines(self._notices(error=False))
+            blocks.append(detail(*rest, warnings=notice_summaries(self.warnings)))
         return blocks
+
+    def _notices(self, *, error: bool) -> list[Notice]:
+        """Return the errors, which stand before its figures, or the other notices."""
+        return [notice for notice in getattr(self, "warnings", ()) if (notice.level == "error") is error]
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as JSON holds them, units in the names."""
@@ -106,9 +111,10 @@ def notice_lines(notices: Sequence[Notice]) -> list[str]:
 
 
 def first_screen(record: Record) -> list[str]:
-    """Return at most ten lines, with the one that says where files are: the answer, the next step, and what to know.
+    """Return at most ten lines, with the one that says where files are.
 
-    Details stand where there is room for them. The last line counts what is left out. Lists are shown as a whole.
+    Errors come first, then the answer, the next step, and what else to know. The last line counts what is left out.
+    Details stand where there is room for them. Lists are shown as a whole.
     """
     everything = record.lines()
     if record.is_list or len(everything) < _LINES:
@@ -123,7 +129,8 @@ def first_screen(record: Record) -> list[str]:
         if not leaf.is_detail or len(leaf.lines) <= spare:
             text += leaf.lines
             spare -= len(leaf.lines) * leaf.is_detail
-    text = [*mark, *text[: free - shown], *(step.line for step in steps[:1]), *notice_lines(notices[:shown])]
+    told = notice_lines(notices[:shown])
+    text = [*mark, *told[:grave], *text[: free - shown], *(step.line for step in steps[:1]), *told[grave:]]
     left_out = Counter[str](notice.level for notice in notices[shown:])
     left_out["line"] = len(everything) - len(text) - left_out.total()
     more = listed([counted(count, noun) for noun, count in left_out.items() if count])

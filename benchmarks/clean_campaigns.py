@@ -3,7 +3,8 @@
 Twenty robots are drawn from their priors, with joints that give way and repeat as arms do. A tracker reads three
 reflectors, markers are read as a pose, or four strings read distances; 10 to 300 configurations, with a load that is
 told or without. Each campaign goes through `check` and `calibrate` as they are by default. Small ones of every fifth
-robot also have each fault, one at a time. Arguments: campaigns (1000), and the first (0). Two processes. Writes benchmarks/clean_campaigns.json.
+robot also have each fault, one at a time. Arguments: campaigns (1000), and the first (0). Two processes. Writes
+benchmarks/clean_campaigns.json.
 """
 
 from __future__ import annotations

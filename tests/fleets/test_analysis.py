@@ -127,14 +127,33 @@ def test_verdicts_and_what_is_not_told() -> None:
     assert {parameter.verdict for parameter in spreads(few)} == {"too few", "shared", "prior only"}
 
 
+@pytest.mark.parametrize("robots", [10, 40])
+def test_few_series_that_are_as_their_priors_say_are_called_wider_or_narrower(robots: int) -> None:
+    rng = np.random.default_rng(robots)
+    trials, found = 60, []
+    for _ in range(trials):
+        truth = rng.standard_normal((robots, COUNT))
+        honest = {parameter.verdict for parameter in spreads(kind_of(rows(truth, rng)))}
+        truth[:, NAMES.index("a_3")] *= 4.0
+        wider = [
+            parameter.parameter for parameter in spreads(kind_of(rows(truth, rng))) if parameter.verdict == "wider"
+        ]
+        found.append((bool(honest & {"wider", "narrower"}), "a_3" in wider))
+    alarms, named = np.sum(found, axis=0)
+    assert alarms <= 3  # 0.6 is promised at most; chance gives 4 of 60 in 1 of 300 runs
+    assert named >= 0.9 * trials
+
+
 def test_a_robot_with_a_fault_does_not_widen_the_priors() -> None:
     rng = np.random.default_rng(4)
     place = NAMES.index("theta_offset_3")
     kind = kind_of(rows(drawn(30, rng, theta_offset_3=12.0), rng))
     faulty = {difference.robot for difference in differences(kind)}
     assert faulty == {"robot-2"}
-    assert spreads(kind)[place].verdict == "wider"
-    assert spreads(kind, faulty)[place].verdict == "agrees"
+    of_all, of_sound = spreads(kind)[place], spreads(kind, faulty)[place]
+    assert known(of_all.proposed) > 1.8 * of_all.prior
+    assert known(of_sound.proposed) < 1.3 * of_sound.prior
+    assert of_sound.verdict == "agrees"
 
 
 def test_proposed_priors_are_a_robot_file_that_can_be_read(tmp_path: Path) -> None:

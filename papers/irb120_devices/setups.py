@@ -70,7 +70,7 @@ Gears = Literal["Table 2.7", "least", "true"]
 
 
 def running_out(twin: Twin, gears: Gears = "Table 2.7") -> Twin:
-    """Return the twin with gears that run out as Table 2.3 needs it beside Table 2.7, no more than it allows, or not."""
+    """Return the twin with gears that run out as Table 2.3 needs beside Table 2.7, as little as it allows, or not."""
     if gears == "true":
         return twin
     least = gears == "least"

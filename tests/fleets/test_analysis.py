@@ -359,6 +359,50 @@ def test_a_change_of_all_machines_alike_is_named() -> None:
     assert len(alike) <= 2
 
 
+def warmed(rng: np.random.Generator, grown: float, temperatures: tuple[float | None, float | None]) -> Drifts:
+    """Measure three machines twice, whose lengths have grown by a share, at temperatures [degC]."""
+    lengths = np.array(
+        [p.nominal / p.prior if p.unit == "m" else 0.0 for p in map(campaign().parameters.__getitem__, campaign().own)]
+    )
+    measured = []
+    for machine in range(3):
+        truth = rng.standard_normal(COUNT)
+        for month, share, how, temperature in ((1, 0.0, STRONG, temperatures[0]), (7, grown, OTHER, temperatures[1])):
+            (row,) = rows((truth + share * lengths)[None], rng, how, names=[f"m{machine}-{month}"], of=f"m{machine}")
+            measured.append(replace(row, date=f"2026-0{month}-01", temperature=temperature))
+    return drifts(kind_of(measured))
+
+
+@pytest.mark.parametrize(
+    ("grown", "temperatures"),
+    [(2.3e-4, (None, None)), (-2.3e-4, (None, 20.0)), (2.3e-4, (20.0, 30.0)), (-1.15e-4, (30.0, 20.0))],
+)
+def test_few_fleets_that_are_only_warmer_or_colder_tell_a_change(
+    grown: float, temperatures: tuple[float | None, float | None]
+) -> None:
+    rng = np.random.default_rng(1)
+    fleets = [warmed(rng, grown, temperatures) for _ in range(20)]
+    assert sum(bool(each.significant) for each in fleets) <= 4  # 1 is promised; chance gives 5 in 1 of 400 runs
+    shares = [growth.share for each in fleets for growth in each.grown]
+    assert len(shares) >= 57
+    assert np.mean(shares) == pytest.approx(grown, rel=0.1)
+    assert {growth.warmer for each in fleets for growth in each.grown} == {
+        None if None in temperatures else np.diff(temperatures)[0]  # type: ignore[arg-type]
+    }
+
+
+@pytest.mark.parametrize(
+    ("grown", "temperatures"),
+    [(2.3e-4, (20.0, 20.0)), (2.3e-4, (30.0, 20.0)), (9e-4, (None, None)), (6e-4, (20.0, 30.0))],
+)
+def test_growth_that_no_temperature_makes_is_told(
+    grown: float, temperatures: tuple[float | None, float | None]
+) -> None:
+    found = warmed(np.random.default_rng(2), grown, temperatures)
+    assert {"a_3", "d_4"} <= {drift.parameter for drift in found.significant}
+    assert not found.grown
+
+
 def test_machines_without_two_dates_are_named() -> None:
     rng = np.random.default_rng(8)
     truth = rng.standard_normal((1, COUNT))

@@ -272,7 +272,8 @@ LEAST_SPREAD: Final = 10
 #: In at most this share of series is any parameter called wider or narrower than its prior although none is.
 _FALSE_VERDICTS: Final = 0.01
 
-#: ``agrees``: chance may make the spread differ so far from the prior. ``too few``, ``shared``, ``prior only``, ``priors differ``: not told.
+#: ``agrees``: chance may make a spread differ so far from its prior. ``too few``, ``shared``, ``prior only``, ``priors
+#: differ``: not told.
 Verdict = Literal["agrees", "wider", "narrower", "too few", "shared", "prior only", "priors differ"]
 
 

@@ -528,7 +528,7 @@ def _growths(kind: Kind, rows: NDArray[np.intp], y: Array, inverse: Array, grows
     normal, wanted = np.einsum("p,pij->ij", grows**2, inverse), np.einsum("p,pij,pj->i", grows, inverse, y)
     if np.isnan(warmer).any():
         most = _MOST_GROWTH * _MOST_WARMER
-        return np.clip(np.linalg.lstsq(normal, wanted, rcond=None)[0], -most, most)
+        return np.asarray(np.clip(np.linalg.lstsq(normal, wanted, rcond=None)[0], -most, most))
     rate = (warmer @ wanted) / max(float(warmer @ normal @ warmer), 1e-300)
     return np.asarray(np.clip(rate, 0.0, _MOST_GROWTH) * warmer)
 

@@ -359,17 +359,21 @@ def test_a_change_of_all_machines_alike_is_named() -> None:
     assert len(alike) <= 2
 
 
-def warmed(rng: np.random.Generator, grown: float, temperatures: tuple[float | None, float | None]) -> Drifts:
-    """Measure three machines twice, whose lengths have grown by a share, at temperatures [degC]."""
-    lengths = np.array(
-        [p.nominal / p.prior if p.unit == "m" else 0.0 for p in map(campaign().parameters.__getitem__, campaign().own)]
-    )
+Warm = tuple[float | None, ...]
+
+
+def warmed(rng: np.random.Generator, grown: float, temperatures: Warm) -> Drifts:
+    """Measure three machines at temperatures [degC], whose lengths have grown by a share from the second one on."""
+    own = [campaign().parameters[place] for place in campaign().own]
+    lengths = np.array([p.nominal / p.prior if p.unit == "m" else 0.0 for p in own])
     measured = []
-    for machine in range(3):
+    for machine in (f"m{number}" for number in range(3)):
         truth = rng.standard_normal(COUNT)
-        for month, share, how, temperature in ((1, 0.0, STRONG, temperatures[0]), (7, grown, OTHER, temperatures[1])):
-            (row,) = rows((truth + share * lengths)[None], rng, how, names=[f"m{machine}-{month}"], of=f"m{machine}")
-            measured.append(replace(row, date=f"2026-0{month}-01", temperature=temperature))
+        for number, temperature in enumerate(temperatures):
+            true = truth + (grown * lengths if number else 0.0)
+            how = OTHER if number else STRONG
+            (row,) = rows(true[None], rng, how, names=[f"{machine}-{number}"], of=machine)
+            measured.append(replace(row, date=f"2026-0{1 + 3 * number}-01", temperature=temperature))
     return drifts(kind_of(measured))
 
 
@@ -377,30 +381,29 @@ def warmed(rng: np.random.Generator, grown: float, temperatures: tuple[float | N
     ("grown", "temperatures"),
     [(2.3e-4, (None, None)), (-2.3e-4, (None, 20.0)), (2.3e-4, (20.0, 30.0)), (-1.15e-4, (30.0, 20.0))],
 )
-def test_few_fleets_that_are_only_warmer_or_colder_tell_a_change(
-    grown: float, temperatures: tuple[float | None, float | None]
-) -> None:
+def test_few_fleets_that_are_only_warmer_or_colder_tell_a_change(grown: float, temperatures: Warm) -> None:
     rng = np.random.default_rng(1)
     fleets = [warmed(rng, grown, temperatures) for _ in range(20)]
     assert sum(bool(each.significant) for each in fleets) <= 4  # 1 is promised; chance gives 5 in 1 of 400 runs
-    shares = [growth.share for each in fleets for growth in each.grown]
-    assert len(shares) >= 57
-    assert np.mean(shares) == pytest.approx(grown, rel=0.1)
-    assert {growth.warmer for each in fleets for growth in each.grown} == {
-        None if None in temperatures else np.diff(temperatures)[0]  # type: ignore[arg-type]
-    }
+    growths = [growth for each in fleets for growth in each.grown]
+    assert len(growths) >= 57
+    assert np.mean([growth.share for growth in growths]) == pytest.approx(grown, rel=0.1)
+    assert {growth.warmer for growth in growths} == {None if None in temperatures else float(np.sign(grown)) * 10.0}
 
 
 @pytest.mark.parametrize(
     ("grown", "temperatures"),
     [(2.3e-4, (20.0, 20.0)), (2.3e-4, (30.0, 20.0)), (9e-4, (None, None)), (6e-4, (20.0, 30.0))],
 )
-def test_growth_that_no_temperature_makes_is_told(
-    grown: float, temperatures: tuple[float | None, float | None]
-) -> None:
+def test_growth_that_no_temperature_makes_is_told(grown: float, temperatures: Warm) -> None:
     found = warmed(np.random.default_rng(2), grown, temperatures)
     assert {"a_3", "d_4"} <= {drift.parameter for drift in found.significant}
     assert not found.grown
+
+
+def test_a_temperature_that_was_not_recorded_at_every_campaign_explains_nothing_by_itself() -> None:
+    found = warmed(np.random.default_rng(3), 2.3e-4, (20.0, None, 20.5))
+    assert [growth.warmer for growth in found.grown] == [None] * 3
 
 
 def test_machines_without_two_dates_are_named() -> None:

@@ -412,7 +412,7 @@ def drifts(kind: Kind) -> Drifts:
     for machine, (dated, as_found) in fitted.items():
         of_machine, share = _without_growth(kind, dated, as_found, _reach(compared))
         if share:
-            warmer = float(kind.temperatures[dated[-1]] - kind.temperatures[dated[0]])
+            warmer = float(np.diff(kind.temperatures[dated]).sum())
             grown.append(Growth(machine, share, None if np.isnan(warmer) else warmer))
         for number, slope in zip(of_machine.numbers.tolist(), of_machine.slopes.tolist(), strict=True):
             slopes.setdefault(kind.parameters[number], []).append(slope)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -31,6 +32,9 @@ class Region:
 
 #: Of the IRB 120: Nubiola, section 2.5; upper ends of joints 2 and 3 are the robot's own limits.
 REGION: Final = Region((-90, 0, -80, -150, -90, -180), (90, 110, 70, 150, 90, 180))
+#: Hayati's beta between axes 2 and 3 of the IRB 120 of study irb120-faro [rad]: the elastic model finds 0.0372 deg from
+#: all 500 configurations, with a standard deviation of 0.0009 deg. Nubiola prints none of his arm.
+BETA: Final = math.radians(0.037)
 #: Frees what the document's Table 2.2 does, and Hayati's beta.
 ELASTIC: Final[Model] = named_model("elastic")
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from papers.irb120 import ELASTIC, REGION, without_beta
+from papers.irb120 import BETA, ELASTIC, REGION, without_beta
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.design import O1, most_informative, most_informative_number
 from truearm.engine.fit.fit import identify
@@ -66,8 +66,14 @@ def driven() -> Robot:
     return replace(robot, joints=tuple(replace(joint, limits=(a, b)) for joint, a, b in joints))
 
 
-def running_out(twin: Twin, *, least: bool = False) -> Twin:
-    """Return the twin with gears that run out as Table 2.3 needs it, or no more than it allows."""
+Gears = Literal["Table 2.7", "least", "true"]
+
+
+def running_out(twin: Twin, gears: Gears = "Table 2.7") -> Twin:
+    """Return the twin with gears that run out as Table 2.3 needs beside Table 2.7, as little as it allows, or not."""
+    if gears == "true":
+        return twin
+    least = gears == "least"
     sines = _LEAST if least else _RUN_OUT
     joints = {
         number: replace(twin.joints.get(number, PERFECT), gear=((1, math.radians(amplitude), math.radians(phase)),))
@@ -128,11 +134,16 @@ class Calibrated:
         return _errors(self.robot, self.setup, truth)
 
 
-def twin_of(setup: Setup, truth: str, *, least: bool = False) -> Twin:
-    """Return the twin with one of the robot file's truths and gears that run out, carrying what the set-up does."""
-    twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)), least=least)
+def twin_of(setup: Setup, truth: str, gears: Gears = "Table 2.7", beta: float = BETA) -> Twin:
+    """Return the twin with one of the robot file's truths, carrying what the set-up does.
+
+    Args:
+        gears: How they run out.
+        beta: How far axis 3 leans sideways against axis 2 [rad].
+    """
+    twin = running_out(truth_twin(driven(), truth, np.random.default_rng(0)), gears)
     robot = twin.robot.with_frames(twin.robot.base, setup.nests).with_payload(setup.payload)
-    return replace(twin, robot=robot)
+    return replace(twin, robot=robot.with_values({"beta_3": beta}))
 
 
 def uncalibrated(setup: Setup, truth: Truth) -> Array:

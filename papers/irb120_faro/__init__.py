@@ -34,7 +34,7 @@ from truearm.importing.files import read_matrices
 #: Training configurations of the document, of `auto` where there are few, and where there are few.
 _DOCUMENT, _AUTO_FEW, _FEW = 38, 40, 50
 #: Of the document's triangular artefact (section 2.2.1), which this end-effector resembles.
-_PAYLOAD: Final = Payload(2.7, (0.050, 0.025, 0.100))
+PAYLOAD: Final = Payload(2.7, (0.050, 0.025, 0.100))
 #: Seeds at which each model's remainder is looked at, at most.
 _REMAINDERS: Final = 2
 _EFFECTS: Final = (
@@ -59,7 +59,7 @@ class _Case:
 
     def of(self, robot: Robot) -> Robot:
         """Return the robot that the fit starts from."""
-        robot = robot.with_payload(_PAYLOAD) if self.payload else robot
+        robot = robot.with_payload(PAYLOAD) if self.payload else robot
         return robot if self.beta else without_beta(robot)
 
 
@@ -122,7 +122,7 @@ def study(
         effects: Effects that are added to the elastic model one by one; the first of `together` is among them.
         together: Effects that are added on top of each other, two at least.
     """
-    raw = _measured(folder)
+    raw = measured(folder)
     if raw.configurations <= many:
         raise InputError(
             "there are too few configurations at which all reflectors were seen",
@@ -179,7 +179,7 @@ def _left_over(
     return tables
 
 
-def _measured(folder: Path) -> Dataset:
+def measured(folder: Path) -> Dataset:
     """Return the measured data of all configurations at which every reflector was seen."""
     targets, bases = ({str(n): folder / f"{kind}_{n}.txt" for n in (1, 2, 3)} for kind in ("target", "base"))
     bases = {f"base_{name}": path for name, path in bases.items()}

@@ -127,14 +127,33 @@ def test_verdicts_and_what_is_not_told() -> None:
     assert {parameter.verdict for parameter in spreads(few)} == {"too few", "shared", "prior only"}
 
 
+@pytest.mark.parametrize("robots", [10, 40])
+def test_few_series_that_are_as_their_priors_say_are_called_wider_or_narrower(robots: int) -> None:
+    rng = np.random.default_rng(robots)
+    trials, found = 60, []
+    for _ in range(trials):
+        truth = rng.standard_normal((robots, COUNT))
+        honest = {parameter.verdict for parameter in spreads(kind_of(rows(truth, rng)))}
+        truth[:, NAMES.index("a_3")] *= 4.0
+        wider = [
+            parameter.parameter for parameter in spreads(kind_of(rows(truth, rng))) if parameter.verdict == "wider"
+        ]
+        found.append((bool(honest & {"wider", "narrower"}), "a_3" in wider))
+    alarms, named = np.sum(found, axis=0)
+    assert alarms <= 3  # 0.6 is promised at most; chance gives 4 of 60 in 1 of 300 runs
+    assert named >= 0.9 * trials
+
+
 def test_a_robot_with_a_fault_does_not_widen_the_priors() -> None:
     rng = np.random.default_rng(4)
     place = NAMES.index("theta_offset_3")
     kind = kind_of(rows(drawn(30, rng, theta_offset_3=12.0), rng))
     faulty = {difference.robot for difference in differences(kind)}
     assert faulty == {"robot-2"}
-    assert spreads(kind)[place].verdict == "wider"
-    assert spreads(kind, faulty)[place].verdict == "agrees"
+    of_all, of_sound = spreads(kind)[place], spreads(kind, faulty)[place]
+    assert known(of_all.proposed) > 1.8 * of_all.prior
+    assert known(of_sound.proposed) < 1.3 * of_sound.prior
+    assert of_sound.verdict == "agrees"
 
 
 def test_proposed_priors_are_a_robot_file_that_can_be_read(tmp_path: Path) -> None:
@@ -338,6 +357,53 @@ def test_a_change_of_all_machines_alike_is_named() -> None:
     alike = {change.parameter: change for change in fleet_drifts.alike}
     assert alike["a_3"].low < 0.05e-3 < alike["a_3"].high
     assert len(alike) <= 2
+
+
+Warm = tuple[float | None, ...]
+
+
+def warmed(rng: np.random.Generator, grown: float, temperatures: Warm) -> Drifts:
+    """Measure three machines at temperatures [degC], whose lengths have grown by a share from the second one on."""
+    own = [campaign().parameters[place] for place in campaign().own]
+    lengths = np.array([p.nominal / p.prior if p.unit == "m" else 0.0 for p in own])
+    measured = []
+    for machine in (f"m{number}" for number in range(3)):
+        truth = rng.standard_normal(COUNT)
+        for number, temperature in enumerate(temperatures):
+            true = truth + (grown * lengths if number else 0.0)
+            how = OTHER if number else STRONG
+            (row,) = rows(true[None], rng, how, names=[f"{machine}-{number}"], of=machine)
+            measured.append(replace(row, date=f"2026-0{1 + 3 * number}-01", temperature=temperature))
+    return drifts(kind_of(measured))
+
+
+@pytest.mark.parametrize(
+    ("grown", "temperatures"),
+    [(2.3e-4, (None, None)), (-2.3e-4, (None, 20.0)), (2.3e-4, (20.0, 30.0)), (-1.15e-4, (30.0, 20.0))],
+)
+def test_few_fleets_that_are_only_warmer_or_colder_tell_a_change(grown: float, temperatures: Warm) -> None:
+    rng = np.random.default_rng(1)
+    fleets = [warmed(rng, grown, temperatures) for _ in range(20)]
+    assert sum(bool(each.significant) for each in fleets) <= 4  # 1 is promised; chance gives 5 in 1 of 400 runs
+    growths = [growth for each in fleets for growth in each.grown]
+    assert len(growths) >= 57
+    assert np.mean([growth.share for growth in growths]) == pytest.approx(grown, rel=0.1)
+    assert {growth.warmer for growth in growths} == {None if None in temperatures else float(np.sign(grown)) * 10.0}
+
+
+@pytest.mark.parametrize(
+    ("grown", "temperatures"),
+    [(2.3e-4, (20.0, 20.0)), (2.3e-4, (30.0, 20.0)), (9e-4, (None, None)), (6e-4, (20.0, 30.0))],
+)
+def test_growth_that_no_temperature_makes_is_told(grown: float, temperatures: Warm) -> None:
+    found = warmed(np.random.default_rng(2), grown, temperatures)
+    assert {"a_3", "d_4"} <= {drift.parameter for drift in found.significant}
+    assert not found.grown
+
+
+def test_a_temperature_that_was_not_recorded_at_every_campaign_explains_nothing_by_itself() -> None:
+    found = warmed(np.random.default_rng(3), 2.3e-4, (20.0, None, 20.5))
+    assert [growth.warmer for growth in found.grown] == [None] * 3
 
 
 def test_machines_without_two_dates_are_named() -> None:

@@ -269,8 +269,11 @@ def _limit(means: Array) -> float:
 
 #: Robots from which on a spread is told; of ten its interval already reaches from two thirds to almost twice of it.
 LEAST_SPREAD: Final = 10
+#: In at most this share of series is any parameter called wider or narrower than its prior although none is.
+_FALSE_VERDICTS: Final = 0.01
 
-#: ``agrees``: the prior lies within the interval. ``too few``, ``shared``, ``prior only``, ``priors differ``: not told.
+#: ``agrees``: chance may make a spread differ so far from its prior. ``too few``, ``shared``, ``prior only``, ``priors
+#: differ``: not told.
 Verdict = Literal["agrees", "wider", "narrower", "too few", "shared", "prior only", "priors differ"]
 
 
@@ -317,7 +320,8 @@ def spreads(kind: Kind, differing: Collection[str] = ()) -> tuple[ParameterSprea
 
     The variance of the values, freed of the pull of the priors, less the mean variance of their estimates. The former
     has an interval by the chi-squared distribution, with fewer degrees of freedom where values far from the mean are
-    more frequent than in a normal distribution (Box 1953).
+    more frequent than in a normal distribution (Box 1953). A verdict counts all parameters that are compared
+    (Bonferroni).
 
     Args:
         differing: Names of measurements that are left out: robots with a fault say nothing of the kind.
@@ -357,16 +361,15 @@ def _spread(kind: Kind, number: int, values: Array, variances: Array, compared: 
     values, estimated = values[known], float(np.mean(variances[known]))
     mean, scatter = float(np.mean(values)), float(np.var(values, ddof=1))
     tail = (1.0 - SURE) / 2.0
-    freedom = _freedom(values)
-    ends = (freedom * scatter / float(chdtri(freedom, p)) - estimated for p in (tail, 1.0 - tail))
-    variance = (scatter - estimated, *ends)
-    spread, low, high = (float(np.sqrt(max(v, 0.0))) for v in variance)
+    freedom, chance = _freedom(values), _FALSE_VERDICTS / 2.0 / compared
+    ends = (freedom * scatter / float(chdtri(freedom, p)) - estimated for p in (tail, 1.0 - tail, chance, 1.0 - chance))
+    spread, low, high, least, most = (float(np.sqrt(max(v, 0.0))) for v in (scatter - estimated, *ends))
     error = float(np.sqrt(scatter / n))
     half = float(stdtrit(n - 1, 1.0 - tail)) * error
     sure = float(stdtrit(n - 1, 1.0 - tail / compared)) * error
     return replace(
         untold,
-        verdict="wider" if low > prior else "narrower" if high < prior else "agrees",
+        verdict="wider" if least > prior else "narrower" if most < prior else "agrees",
         mean=mean,
         mean_low=mean - half,
         mean_high=mean + half,

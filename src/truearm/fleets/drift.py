@@ -103,7 +103,9 @@ class Kind:
     robot: str  #: Its name.
     names: tuple[str, ...]  #: Of the measurements, ``rows`` of them.
     machines: tuple[str, ...]  #: The machine of each: several measurements may be of one.
-    days: Array  #: When, in days; NaN where that is not known, ``(rows,)``.
+    #: days, temperatures: when, in days, and of the arm [degC]; NaN where that is not known, ``(rows,)``.
+    days: Array
+    temperatures: Array
     #: parameters, units: those of the arm that were identified in any row, with their SI units.
     parameters: tuple[str, ...]
     units: tuple[str, ...]
@@ -178,6 +180,7 @@ class Gathered:
         self.names: list[str] = []
         self._machines: list[str] = []
         self._days: list[float] = []
+        self._temperatures: list[float] = []
         self._drawn: list[bool] = []
         self._units: dict[str, str] = {}
         self._waiting: dict[tuple[str, ...], list[tuple[int, FoundParameters]]] = {}
@@ -193,6 +196,7 @@ class Gathered:
         self.names.append(row.name)
         self._machines.append(row.machine)
         self._days.append(day_of(row.date))
+        self._temperatures.append(float("nan") if row.temperature is None else row.temperature)
         self._drawn.append(row.drawn)
         self._covariances.append(row.covariance)
         if len(waiting) == _AT_ONCE:
@@ -231,6 +235,7 @@ class Gathered:
             names=tuple(self.names),
             machines=tuple(self._machines),
             days=np.array(self._days),
+            temperatures=np.array(self._temperatures),
             parameters=tuple(self._units),
             units=tuple(self._units.values()),
             nominal=nominal,
@@ -277,6 +282,11 @@ _LIKELY: Final = 2.5
 _AS_ANOTHER: Final = 0.7
 _LEAST_PARAMETERS: Final = 8
 _Z: Final = 1.959963984540054
+#: Growth with the temperature that is taken for possible [1/K], aluminium's, and steel's beside it; and a difference
+#: between campaigns whose temperatures nobody recorded [K].
+_MOST_GROWTH: Final = 24e-6
+_LEAST_GROWTH: Final = 11.5e-6
+_MOST_WARMER: Final = 20.0
 #: A line is called no line where chance alone bends one as far so rarely.
 _CURVED: Final = 0.01
 
@@ -338,6 +348,20 @@ class AllDrift:
 
 
 @dataclass(frozen=True)
+class Growth:
+    """All lengths of a machine grew alike, as far as a temperature explains it: that is no change of the machine."""
+
+    machine: str
+    share: float  #: Of each length, from the first campaign to the last; negative where they shrank.
+    warmer: float | None  #: By how much the last campaign was [K]; None if that was not recorded.
+
+    @property
+    def explaining(self) -> tuple[float, float]:
+        """The differences of temperature that would make an arm of aluminium, and of steel, grow so [K]."""
+        return self.share / _MOST_GROWTH, self.share / _LEAST_GROWTH
+
+
+@dataclass(frozen=True)
 class Drifts:
     """Machines that were measured again."""
 
@@ -347,6 +371,7 @@ class Drifts:
     compared: int = 0  #: How many parameters of machines were looked at.
     #: Parameters that change alike in all machines: what measured them may have changed instead.
     alike: tuple[AllDrift, ...] = ()
+    grown: tuple[Growth, ...] = ()  #: Machines whose lengths changed as a temperature explains: not in `changes`.
     undated: tuple[str, ...] = ()  #: Machines with several measurements, but not at two known dates.
     #: Machines whose results differ as those of two robots do: their serial numbers may be wrong.
     others: tuple[str, ...] = ()
@@ -362,15 +387,16 @@ def drifts(kind: Kind) -> Drifts:
     """Return how parameters of machines that were measured at several dates went on.
 
     A line is fitted through the results of each machine, weighted by the covariance of the differences between them.
-    The chance is that of the normal distribution times the number of comparisons (Bonferroni).
+    The chance is that of the normal distribution times the number of comparisons (Bonferroni). Where lengths changed by
+    more than that, and by no more than that beside a uniform growth that a temperature explains, this is taken out.
     """
     again: dict[str, list[int]] = {}
     for row, machine in enumerate(kind.machines):
         again.setdefault(machine, []).append(row)
     lines: list[Drift] = []
-    undated, others = [], []
+    undated, others, grown = [], [], list[Growth]()
     slopes: dict[str, list[float]] = {}
-    compared = 0
+    fitted: dict[str, tuple[list[int], _Lines]] = {}
     few = sum(len(rows) > 1 for rows in again.values()) <= _FEW
     for machine, rows in again.items():
         if len(rows) < 2:
@@ -379,10 +405,15 @@ def drifts(kind: Kind) -> Drifts:
         if len(dated) < 2 or kind.days[dated[0]] == kind.days[dated[-1]]:
             undated.append(machine)
             continue
-        of_machine = _lines(kind, dated)
-        compared += len(of_machine.numbers)
+        fitted[machine] = (dated, _lines(kind, dated))
         if _is_another(kind, dated):
             others.append(machine)
+    compared = sum(len(of_machine.numbers) for _, of_machine in fitted.values())
+    for machine, (dated, as_found) in fitted.items():
+        of_machine, share = _without_growth(kind, dated, as_found, _reach(compared))
+        if share:
+            warmer = float(np.diff(kind.temperatures[dated]).sum())
+            grown.append(Growth(machine, share, None if np.isnan(warmer) else warmer))
         for number, slope in zip(of_machine.numbers.tolist(), of_machine.slopes.tolist(), strict=True):
             slopes.setdefault(kind.parameters[number], []).append(slope)
         lines += [
@@ -402,6 +433,7 @@ def drifts(kind: Kind) -> Drifts:
         tuple(sorted(changes, key=lambda change: (change.chance, -abs(change.times)))),
         compared,
         _alike(slopes, units),
+        tuple(grown),
         tuple(undated),
         tuple(others),
         tuple(name for name, is_unknown in zip(kind.parameters, nothing.tolist(), strict=True) if is_unknown)
@@ -431,6 +463,7 @@ class _Lines:
     changes: Array  #: changes, deviations: since the first campaign [SI], ``(parameters, campaigns)``.
     deviations: Array
     misfit_chance: Array  #: How rarely chance bends a line so far, ``(parameters,)``; NaN of two campaigns.
+    grown: float = 0.0  #: Share by which all lengths grew from the first campaign to the last, where that is taken out.
 
     @property
     def times(self) -> Array:
@@ -461,8 +494,51 @@ class _Lines:
         )
 
 
-def _lines(kind: Kind, machine_rows: list[int]) -> _Lines:
-    """Return a line through the campaigns of a machine for each parameter that all of them determine or share."""
+def _without_growth(kind: Kind, rows: list[int], as_found: _Lines, reach: float) -> tuple[_Lines, float]:
+    """Return the lines beside a uniform growth of all lengths, and that as a share, if it explains these; else 0.
+
+    Args:
+        as_found: The lines with it.
+        reach: Deviations from which on a change is more than chance.
+    """
+    lengths = _lengths(kind)
+    changed = (np.abs(as_found.times) > reach) & (lengths[as_found.numbers] != 0.0)
+    if not changed.any():
+        return as_found, 0.0
+    beside = _lines(kind, rows, growing=True)
+    left = np.abs(beside.times[lengths[beside.numbers] != 0.0])
+    return (as_found, 0.0) if (left > reach).any() else (beside, beside.grown)
+
+
+def _lengths(kind: Kind) -> Array:
+    """Return nominal lengths [priors], ``(parameters,)``; 0 for what is none."""
+    return np.where(np.array(kind.units) == "m", np.nan_to_num(kind.nominal / kind.prior), 0.0)
+
+
+def _growths(kind: Kind, rows: NDArray[np.intp], y: Array, inverse: Array, grows: Array) -> Array:
+    """Return the uniform growth of lengths between campaigns that fits best, as a share, ``(campaigns - 1,)``.
+
+    In proportion to the temperature where that was recorded at all campaigns, else whatever a temperature may make.
+
+    Args:
+        y, inverse: Changes between campaigns [SI], and the inverses of their covariances.
+        grows: How much of each parameter grows with the lengths [SI], ``(parameters,)``.
+    """
+    warmer = np.diff(kind.temperatures[rows])
+    normal, wanted = np.einsum("p,pij->ij", grows**2, inverse), np.einsum("p,pij,pj->i", grows, inverse, y)
+    if np.isnan(warmer).any():
+        most = _MOST_GROWTH * _MOST_WARMER
+        return np.asarray(np.clip(np.linalg.lstsq(normal, wanted, rcond=None)[0], -most, most))
+    rate = (warmer @ wanted) / max(float(warmer @ normal @ warmer), 1e-300)
+    return np.asarray(np.clip(rate, 0.0, _MOST_GROWTH) * warmer)
+
+
+def _lines(kind: Kind, machine_rows: list[int], *, growing: bool = False) -> _Lines:
+    """Return a line through the campaigns of a machine for each parameter that all of them determine or share.
+
+    Args:
+        growing: Whether a uniform growth of all lengths is taken out before.
+    """
     rows = np.array(machine_rows)
     measured = ~np.isnan(kind.difference[rows]).any(axis=0)
     numbers = np.flatnonzero((kind.determined | kind.shared) & measured)
@@ -480,6 +556,12 @@ def _lines(kind: Kind, machine_rows: list[int]) -> _Lines:
     numbers, y, values, variance = numbers[sound], y[sound], values[sound], variance[sound]
     sizes = scale[sound][:, :, None] * scale[sound][:, None, :]
     inverse = np.linalg.pinv(between[sound] / sizes, hermitian=True) / sizes
+    grown = np.zeros(len(rows))
+    if growing:
+        grows = _resolved(kind, rows)[numbers] / pull[sound]
+        grown[1:] = np.cumsum(_growths(kind, rows, y, inverse, grows))
+        values = values - grows[:, None] * grown
+        y = values @ contrast.T
     weight = np.maximum(np.einsum("i,pij,j->p", t, inverse, t), 1e-300)
     slopes = np.einsum("i,pij,pj->p", t, inverse, y) / weight
     left = y - slopes[:, None] * t
@@ -495,17 +577,30 @@ def _lines(kind: Kind, machine_rows: list[int]) -> _Lines:
         changes=values - values[:, :1],
         deviations=np.sqrt(since),
         misfit_chance=_chances(misfit, len(rows) - 2),
+        grown=float(grown[-1]),
     )
     order = np.argsort(-np.abs(fitted.times), kind="stable")
-    return _Lines(
-        numbers[order],
-        months,
-        fitted.slopes[order],
-        fitted.errors[order],
-        fitted.changes[order],
-        fitted.deviations[order],
-        fitted.misfit_chance[order],
+    return replace(
+        fitted,
+        numbers=numbers[order],
+        slopes=fitted.slopes[order],
+        errors=fitted.errors[order],
+        changes=fitted.changes[order],
+        deviations=fitted.deviations[order],
+        misfit_chance=fitted.misfit_chance[order],
     )
+
+
+def _resolved(kind: Kind, rows: NDArray[np.intp]) -> Array:
+    """Return how much larger each parameter is found where all lengths grow by their own size [SI], ``(parameters,)``.
+
+    That is ``A`` times the lengths; without correlations what is drawn is drawn by its own prior alone.
+    """
+    lengths = _lengths(kind)
+    known = [c for row in rows.tolist() if kind.drawn[row] and (c := kind.covariances[row]) is not None]
+    if len(known) == len(rows):
+        return np.asarray(kind.prior * (lengths - np.mean(known, axis=0) @ lengths))
+    return np.asarray(kind.prior * lengths * kind.pull[rows].mean(axis=0))
 
 
 def _chances(misfit: Array, freedom: int) -> Array:
@@ -533,13 +628,20 @@ def _covariances(kind: Kind, rows: NDArray[np.intp]) -> Array:
     return np.asarray(covariances)
 
 
+def _reach(compared: int) -> float:
+    """Return the deviations from which on a change is more than chance (Bonferroni)."""
+    from scipy.special import ndtri
+
+    return float(-ndtri(FALSE_ALARMS / (2.0 * max(compared, 1))))
+
+
 def _with_chances(lines: list[Drift], compared: int) -> list[Drift]:
     """Return changes with their chances, and intervals that hold for all comparisons together (Bonferroni)."""
-    from scipy.special import ndtr, ndtri
+    from scipy.special import ndtr
 
     times = np.array([line.times for line in lines])
     chances = np.minimum(2.0 * ndtr(-np.abs(times)) * compared, 1.0)
-    reach = float(-ndtri(FALSE_ALARMS / (2.0 * max(compared, 1))))
+    reach = _reach(compared)
     changes = []
     for line, chance in zip(lines, chances.tolist(), strict=True):
         half = reach / _Z * (line.high - line.slope)

@@ -74,6 +74,7 @@ class _Row(TypedDict):
     drawn: NotRequired[bool]
     covariance: NotRequired[list[Number]]
     simulated: NotRequired[bool]
+    temperature: NotRequired[Number]
 
 
 class _Said(TypedDict):

@@ -21,7 +21,14 @@ from truearm.engine.document.document import (
 from truearm.engine.document.drawing import Figure, significant
 from truearm.fleets.analysis import LEAST_COMPARED, LEAST_SPREAD, ParameterSpread
 from truearm.fleets.figures import figures_text, fleet_figures
-from truearm.fleets.words import PRIORS_FILE, difference_words, outcome_words, reason_words, together_words
+from truearm.fleets.words import (
+    PRIORS_FILE,
+    difference_words,
+    growth_words,
+    outcome_words,
+    reason_words,
+    together_words,
+)
 
 if TYPE_CHECKING:
     from truearm.fleets.analysis import Analysis, KindAnalysis
@@ -188,6 +195,7 @@ def _drifts(analysis: Analysis, drawn: dict[str, Figure]) -> list[Section]:
                 *(Picture(name, drawn[name]) for name in ("drift-lengths", "drift-angles") if name in drawn),
                 Table(heading, rows, texts=(1, 7), look="parameters", wide=True),
                 *_and_more(len(analysis.drifts)),
+                *(Words(f"{growth_words(growth)}.") for kind in analysis.kinds for growth in kind.drifts.grown[:_ROWS]),
                 Words(words, quiet=True),
             ],
             "drift",

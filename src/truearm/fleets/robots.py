@@ -97,7 +97,7 @@ def _changed(entry: RobotEntry, noted: Mapping[Path, Sequence[str]]) -> Path | N
 
 def _row(entry: RobotEntry, calibration: Calibration, began: float) -> Row:
     names, covariance = _own(calibration)
-    mapping = calibration.fit.robot.parameters
+    mapping, temperature = calibration.fit.robot.parameters, calibration.data.temperature
     return Row(
         entry.name,
         "calibrated",
@@ -120,6 +120,7 @@ def _row(entry: RobotEntry, calibration: Calibration, began: float) -> Row:
         drawn=entry.options.get("redundancy", "prior") == "prior",
         covariance=covariance,
         simulated=bool(calibration.simulated_from),
+        temperature=None if temperature is None else float(temperature.mean()),
     )
 
 

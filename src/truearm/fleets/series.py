@@ -181,6 +181,7 @@ class Row:
     #: Of the parameters, in priors: the rows of the lower triangle one after the other; empty where it is not kept.
     covariance: tuple[float, ...] = ()
     simulated: bool = False  #: Whether its measurements are marked as those of a virtual instrument.
+    temperature: float | None = None  #: Mean of the arm while it was measured [degC]; None if it was not recorded.
 
     @property
     def machine(self) -> str:
@@ -207,6 +208,7 @@ class Row:
             **({} if self.drawn else {"drawn": False}),
             **({"covariance": [*self.covariance]} if self.covariance else {}),
             **({"simulated": True} if self.simulated else {}),
+            **({} if self.temperature is None else {"temperature": self.temperature}),
         }
 
     @classmethod
@@ -234,6 +236,7 @@ class Row:
             drawn=content.get("drawn", True),
             covariance=tuple(content.get("covariance", ())),
             simulated=content.get("simulated", False),
+            temperature=content.get("temperature"),
         )
 
 

@@ -18,7 +18,7 @@ from truearm.fleets.analysis import (
     ParameterSpread,
     Reason,
 )
-from truearm.fleets.drift import Drift, Quantile
+from truearm.fleets.drift import Drift, Growth, Quantile
 
 #: The nominal robot with the priors that follow from a fleet; written where some do.
 PRIORS_FILE: Final = "priors.yaml"
@@ -127,6 +127,10 @@ def _kind(analysis: KindAnalysis, *, several: bool) -> Iterator[Block]:
         differing=[_difference(difference) for difference in analysis.differences[:_MOST_LOOKS]],
         drift=[_drift(drift) for drift in analysis.drifts.changes[:_MOST_LOOKS]],
         drift_not_seen=[*analysis.drifts.unknown],
+        grown=[
+            {"machine": growth.machine, "ppm": growth.share * 1e6, "warmer_k": growth.warmer}
+            for growth in analysis.drifts.grown[:_MOST_LOOKS]
+        ],
     )
     text = []
     for verdict, words in _VERDICTS.items():
@@ -239,14 +243,30 @@ def drift_words(drift: Drift) -> str:
     )
 
 
+def growth_words(growth: Growth) -> str:
+    """Return by how much the lengths of a machine grew alike, and which temperature explains that."""
+    did, how = ("grew", "warmer") if growth.share > 0.0 else ("shrank", "colder")
+    size = f"{growth.machine}: all lengths {did} by {abs(growth.share) * 1e6:.0f} ppm"
+    if growth.warmer is not None:
+        return f"{size}, as its temperature explains: it was {abs(growth.warmer):.1f} K {how}"
+    aluminium, steel = (abs(difference) for difference in growth.explaining)
+    return (
+        f"{size}. An arm that is {aluminium:.2g} K (aluminium) to {steel:.2g} K (steel) {how} does so, and the data do "
+        "not say how warm it was: record it in the column temperature [degC]"
+    )
+
+
 def _changes(analysis: Analysis) -> Iterator[Words]:
     """Give what has changed of machines that were measured again; JSON holds it with their kind."""
     machines = {drift.machine for drift in analysis.drifts}
+    grown = [growth for kind in analysis.kinds for growth in kind.drifts.grown]
     if machines:
         changed = [drift for drift in analysis.drifts if drift.significant]
         those = {drift.machine for drift in changed}
-        words = f"{counted(len(those), 'machine')} changed" if those else "none has changed by more than chance"
+        beyond = "chance and temperature explain" if grown else "chance"
+        words = f"{counted(len(those), 'machine')} changed" if those else f"none has changed by more than {beyond}"
         yield say(f"Measured again: {counted(len(machines), 'machine')}; {words}.")
+        yield say(*(f"  {growth_words(growth)}" for growth in grown[:_MOST_LINES]))
         yield detail(*(f"  {drift.machine}: {drift_words(drift)}" for drift in changed))
     for alike in (change for kind in analysis.kinds for change in kind.drifts.alike):
         yield detail(f"  all machines alike: {alike.parameter} {sized(alike.slope, alike.unit, sign=True)} a month")
@@ -319,7 +339,7 @@ ROBOTS_DRIFT: Final = Rule(
 DRIFT_ALIKE: Final = Rule(
     "drift-alike",
     "warning",
-    "the same parameters changed alike in all of five or more machines: look at what measured them",
+    "the same parameters changed alike in all of five or more machines: look at what measured them and at temperatures",
 )
 ANOTHER_MACHINE: Final = Rule(
     "another-machine",
@@ -359,8 +379,8 @@ def analysis_notices(analysis: Analysis) -> list[Notice]:
     if alike:
         notices.append(
             DRIFT_ALIKE(
-                f"The same parameters changed alike in all machines ({listed(alike)}): what measured them has more "
-                "likely changed than all of them."
+                f"The same parameters changed alike in all machines ({listed(alike)}): what measured them, or the "
+                "temperature, has more likely changed than all of them."
             )
         )
     others = [name for kind in analysis.kinds for name in kind.drifts.others]

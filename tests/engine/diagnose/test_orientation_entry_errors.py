@@ -16,6 +16,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.readers.mapping import AnglesEntry
 from truearm.engine.data.readers.row_values import quaternions_of_angles
 from truearm.engine.diagnose.entry_error_trials import orientation_entry_errors
+from truearm.engine.diagnose.entry_errors import entry_errors_in_positions
 from truearm.engine.diagnose.wrong_robot import implausible
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
@@ -110,6 +111,24 @@ def test_a_rotation_vector_that_was_read_as_angles_is_named() -> None:
 def test_a_check_says_it_too_and_nothing_of_sound_orientations() -> None:
     for data, codes in ((sound(), []), (read_otherwise("from the other end"), ["orientation-order"])):
         assert [n.code for n in check(ROBOT, data).warnings if n.level == "error"] == codes
+
+
+def test_inverted_poses_of_any_instrument_are_named() -> None:
+    data = sound()
+    R = rotation_from_quaternion(np.asarray(data.quaternion))
+    position = -np.einsum("nji,nj->ni", R, data.position)
+    inverted = replace(data, position=position, quaternion=quaternion_from_rotation(np.swapaxes(R, 1, 2)))
+    (notice,) = check(ROBOT, inverted).warnings
+    assert (notice.code, notice.level) == ("orientation-order", "error")
+    assert notice.message.startswith("The poses are inverted: each is that of the instrument, seen from the target.")
+
+
+def test_poses_of_another_robot_or_of_other_rows_are_not_called_inverted() -> None:
+    data = with_orientations("irb120", 20, 0)
+    others = replace(data, joints=np.random.default_rng(0).permutation(data.joints))
+    for robot, poses in (("ur5", data), ("irb120", others)):
+        codes = {notice.code for notice in entry_errors_in_positions(load_robot(robot), poses)}
+        assert "orientation-order" not in codes, robot
 
 
 def test_the_fit_says_the_cause() -> None:

@@ -155,8 +155,9 @@ def _column_entry_errors(data: Dataset, onto: Array) -> Iterator[EntryError]:
 def mirrored(data: Dataset) -> Iterator[EntryError]:
     """Try the mirror image of the positions."""
     words = (
-        "The positions are mirrored: two of the columns x, y and z are exchanged, or the sign of one is wrong. The "
-        "data fit with their mirror image. Fix the columns; an instrument's axes are right-handed"
+        "The positions are mirrored: two of the columns x, y and z are exchanged, the sign of one is wrong, or a "
+        "camera mirrored its pictures. The data fit with their mirror image. Fix that; an instrument's axes are "
+        "right-handed"
     )
     yield EntryError(MIRRORED, words, replace(data, position=data.position * np.array([1.0, 1.0, -1.0])))
 
@@ -278,7 +279,7 @@ ORIENTATION_ORDER: Final = Rule(
     "error",
     "orientations, all or some, that would turn as the robot does if their numbers were read otherwise: [angles by "
     "another convention](check.md#orientations-read-by-another-convention), quaternions in another order, or their "
-    "inverse, as of transposed matrices",
+    "inverse, as of transposed matrices; or [inverted poses](hand-eye.md#a-table-that-is-wrong)",
     cure="Fix the mapping, or whatever made quaternions of them.",
     formerly="quaternion-order",
 )
@@ -333,6 +334,28 @@ def orientation_entry_errors(robot: Robot, data: Dataset) -> list[Notice]:
     if readings.rows < _FEWEST:
         return []
     return _of_angles(readings, rotation_from_quaternion(read), as_given)
+
+
+def pose_entry_errors(data: Dataset) -> Iterator[EntryError]:
+    """Try poses that are inverted, and quaternions in another order that have bent the places too.
+
+    Of a camera on the flange the poses that come are inverted before they are measurements. So where the instrument is,
+    seen from the target, stays right whatever is wrong with the quaternion.
+    """
+    if data.quaternion is None or not data.has_orientation[data.has_position].all():
+        return
+    inverse = data.quaternion * _INVERSE
+    seen = np.einsum("nij,nj->ni", rotation_from_quaternion(inverse), data.position)
+    words = (
+        "The poses are inverted: each is that of the instrument, seen from the target. Invert them. Of a camera and a "
+        "board either the other one is on the flange, or the table has the camera in the board"
+    )
+    yield EntryError(ORIENTATION_ORDER, words, replace(data, position=-seen, quaternion=inverse))
+    for words, order in _NUMBERS:
+        turned = inverse[:, order] * _INVERSE
+        position = np.einsum("nij,nj->ni", rotation_from_quaternion(turned), seen)
+        words = f"The quaternions do not turn as the robot does: {words}. Exchange the columns"
+        yield EntryError(ORIENTATION_ORDER, words, replace(data, position=position, quaternion=turned))
 
 
 def _of_numbers(read: Array) -> Iterator[tuple[str, Array]]:

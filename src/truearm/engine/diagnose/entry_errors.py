@@ -30,6 +30,7 @@ from truearm.engine.diagnose.entry_error_trials import (
     mixed_angle_entry_errors,
     order_entry_errors,
     orientation_entry_errors,
+    pose_entry_errors,
     scale_entry_errors,
     shifted,
     sign_entry_errors,
@@ -278,8 +279,8 @@ def entry_errors_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
     """Return which data-entry error explains positions in the instrument's frame; nothing if all or none fit."""
     data, robot = _few_targets(data), robot.with_frames(Transform(), {})  # made once for all that is tried
     turned = orientation_entry_errors(robot, _some(data))
-    some, positions = _some(data), replace(data, quaternion=None, sigma_rot=None)
-    some = replace(some, quaternion=None, sigma_rot=None)
+    poses = [replace(entry, data=_positions(entry.data)) for entry in pose_entry_errors(_some(data))]
+    some, positions = _positions(_some(data)), _positions(data)
     seen = [t for t in range(len(some.targets)) if (some.has_position & (some.target == t)).any()]
     errors = placed_errors(robot, [_only(some, t) for t in seen])
     misfit = {t: float(np.median(off)) for t, off in zip(seen, errors, strict=True)}
@@ -298,7 +299,7 @@ def entry_errors_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
         best = _best(
             robot,
             some,
-            _simple_entry_errors(robot, positions),
+            [*_simple_entry_errors(robot, positions), *poses],
             lambda: [
                 entry for size in (2, 3) for entry in as_noted(robot, some, partial(sign_entry_errors, size=size))
             ],
@@ -527,6 +528,10 @@ def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
 
 
 # -- parts of the data -------------------------------------------------------------------------------------
+
+
+def _positions(data: Dataset) -> Dataset:
+    return replace(data, quaternion=None, sigma_rot=None)
 
 
 def _some(data: Dataset) -> Dataset:

@@ -375,3 +375,12 @@ def test_what_is_not_known_of_curves_is_said() -> None:
     assert about_curves(curved, 20).endswith("measure about 200.")
     assert "were not looked for" in about_curves(fit, 300)
     assert about_curves(curved, 300) == ""
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_repeatability_and_noise_that_explain_all_are_the_end(declared: bool) -> None:
+    data = elastic(poses=150, repeatability=0.003)
+    run = calibrated(data if declared else replace(data, sigma=None))
+    assert "unexplained" not in {step.code for step in run.next}
+    (end,) = (step for step in run.next if step.code == "stop")
+    assert "errors of the joints of 0.00" in end.message

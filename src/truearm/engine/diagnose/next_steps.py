@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.engine.base.errors import Notice, counted, listed
 from truearm.engine.data.statistics import Errors
@@ -144,6 +145,8 @@ _LEAST_GAIN: Final = 0.1
 _AT_THE_NOISE: Final = 1.3
 #: Share of the variance of what is left that errors of the joints may have where it is called noise.
 _OF_THE_JOINTS: Final = 0.5
+#: Errors of the joints that are called repeatability [rad]: 0.1 mm at the reach of a UR5, its pose repeatability.
+_REPEATED: Final = math.radians(0.007)
 #: Mean length of three normal coordinates over the deviation of one.
 _LENGTH: Final = 2.0 * math.sqrt(2.0 / math.pi)
 #: Steps to a model that has what the present one lacks, and how many times as much as by other steps must be gained by
@@ -406,6 +409,21 @@ def _unexplained(first: str, untold: str, last: str) -> str:
     return f"{first}, and no effect known here explains it. V{again}"
 
 
+def _by_joints(left: LeftOver, metres: Array, used: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return what errors of the joints make of a coordinate [m], root mean square, and the largest of them [rad].
+
+    Args:
+        metres: Deviation of each row [m], ``(rows,)``.
+        used: Rows that are lengths, ``(rows,)``.
+    """
+    fit = left.fit
+    if not fit.joint_error.any() or not used.any():
+        return 0.0, 0.0
+    vector = np.array([fit.robot.values[name] for name in fit.free.names])
+    squares = (left.problem.at(vector).by_joints[used] * metres[used][:, None]) ** 2 @ fit.joint_error**2
+    return math.sqrt(float(np.mean(squares))), float(fit.joint_error.max())
+
+
 def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
     """Say that it is done, or that nothing known here explains what is left.
 
@@ -421,22 +439,23 @@ def _end(left: LeftOver, configurations: int | None = None) -> NextStep:
     size = spread * float(np.sqrt(np.mean((r[used] * metres[used]) ** 2))) if used.any() else 0.0
     noise = float(np.sqrt(np.mean(metres[used] ** 2))) if used.any() else 0.0
     figure = f"{size * 1e3:.2g} mm in each coordinate"
-    if fit.declared and size > _AT_THE_NOISE * noise:
+    shared, missed = _by_joints(left, metres, used)
+    is_repeatability = shared > 0.0 and missed <= _REPEATED and size <= _AT_THE_NOISE * math.hypot(noise, shared)
+    if fit.declared and size > _AT_THE_NOISE * noise and not is_repeatability:
         first = f"What is left ({figure}) is {size / noise:.2g} times the declared noise"
         return NextStep("unexplained", _unexplained(first, untold, "and check sigma."))
-    if not fit.declared and fit.joint_error.any():
-        vector = np.array([fit.robot.values[name] for name in fit.free.names])
-        shared = (left.problem.at(vector).by_joints[used] * metres[used][:, None]) ** 2 @ fit.joint_error**2
-        if float(np.mean(shared)) > _OF_THE_JOINTS * size**2:
-            return NextStep(
-                "unexplained",
-                _unexplained(
-                    f"What is left ({figure}) is shared by the readings of a configuration",
-                    untold,
-                    "which is what is left if they scatter as much.",
-                ),
-            )
+    if not fit.declared and shared**2 > _OF_THE_JOINTS * size**2 and not is_repeatability:
+        return NextStep(
+            "unexplained",
+            _unexplained(
+                f"What is left ({figure}) is shared by the readings of a configuration",
+                untold,
+                "which is what is left if they scatter as much.",
+            ),
+        )
     known = "is the instrument's noise" if fit.declared else "looks like the instrument's noise"
+    if is_repeatability and size > _AT_THE_NOISE * noise:
+        known += f" and errors of the joints of {math.degrees(missed):.2g} deg, to which good arms repeat"
     effects = (
         ", and no effect known here explains more of it."
         if can_explain(left)

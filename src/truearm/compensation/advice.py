@@ -372,12 +372,9 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
         ]
     else:
         sentences = [
-            "No frame has a measured place (`frames`). Calibration cannot know where a program's frames really are, so "
-            f"the base was shifted by {size(frames.base)} until the corrections of all targets have no shift and no "
-            "turn in common: targets are right to each other, and the pattern of their positions stays where it was. A "
-            "work object that was located elsewhere than at its targets may be off by what the uncorrected robot "
-            "missed there: "
-            "give `frames`."
+            "The targets are right relative to each other. Where the whole pattern lies is not known: give the frames "
+            f"a measured place (`frames`). The base was shifted by {size(frames.base)}, so that the corrections have "
+            "no shift and no turn in common."
         ]
     if frames.tools == "identified":
         sentences.append("The program's tools are where `tools` places them, on the identified flange.")
@@ -392,11 +389,11 @@ def frame_words(result: CorrectedPrograms) -> list[str]:
             else "No tool has a measured place (`tools`)"
         )
         sentences.append(
-            f"{assumption}. The program's tools are taken to sit on a flange that agrees best with the nominal one all "
-            f"over the workspace, {size(frames.flange)} from the identified one."
+            f"{assumption}. The flange is taken to be where it agrees best with the nominal one over the workspace, "
+            f"{size(frames.flange)} from the identified one."
         )
         if any(correction.expected is not None for correction in result.corrections):
-            sentences[-1] += " No reading tells where it really is; the errors to expect contain that."
+            sentences[-1] += " The errors to expect contain that."
     return sentences
 
 

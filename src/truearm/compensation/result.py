@@ -312,9 +312,7 @@ class ProgramCorrection(Record):
         if not self.result.relative:
             return ""
         each = "in each frame" if self.result.choice.was_taught("frames") else "of all programs together"
-        sentence = (
-            f"These errors are of the targets relative to each other, {each}: where a frame is as a whole is not known."
-        )
+        sentence = f"These errors are of the targets relative to each other, {each}."
         if any(file.skipped for file in self.files):
             sentence += (
                 " What is left unchanged is not in them: it now lies off the others by as much as those were moved."

@@ -55,9 +55,9 @@ class Demonstration(Record):
 
     def blocks(self) -> Iterator[Block]:
         """Give both results, and where their reports are."""
-        mark, errors, *rest = self.calibration.everything()
+        mark, dangers, errors, *rest = self.calibration.everything()
         further = (replace(block, is_detail=True) if isinstance(block, Words) else block for block in rest)
-        yield under("calibration", [mark, errors, *further])
+        yield under("calibration", [mark, dangers, errors, *further])
         if self.correction is None:
             yield say(correction=None)
         else:

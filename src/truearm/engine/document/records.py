@@ -117,9 +117,9 @@ def first_screen(record: Record) -> list[str]:
     Details stand where there is room for them. Lists are shown as a whole.
     """
     everything = record.lines()
-    if record.is_list or len(everything) < _LINES:
-        return everything
     notices, steps = worst_first(getattr(record, "warnings", ())), getattr(record, "next", ())
+    if record.is_list or (len(everything) < _LINES and len(notices) <= _FIRST):
+        return everything
     mark, leaves = mark_lines(record.simulated_from), [*leaves_of(record.blocks())]
     free = _LINES - len(mark) - len(steps[:1]) - 2  # the last two count the rest, and say where files are
     grave, answer = sum(n.level == "error" for n in notices), sum(len(x.lines) for x in leaves if not x.is_detail)

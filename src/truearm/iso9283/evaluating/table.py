@@ -26,6 +26,8 @@ UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {
     "compliance": ("mm/N", 1e3),
 }
 _DECIMALS: Final[Mapping[Quantity, int]] = {"length": 4, "angle": 4, "time": 3, "ratio": 3, "speed": 2, "compliance": 6}
+#: Criteria that are the largest of their cycles; others that have a range are the mean.
+_LARGEST: Final = ("OV", "FV")
 #: Columns of :attr:`Worst.cells`.
 HEADING: Final = ("Criterion", "Worst place", "Value", "95 %, or range", "Other velocities", "Status")
 #: Where the value is the worst of several places already.
@@ -113,7 +115,8 @@ def beside_words(value: Value) -> str:
         return f"{low} to {high}"
     if value.least is not None and value.largest is not None:
         low, high = (_number(end, value.quantity) for end in (value.least, value.largest))
-        return f"{low} to {high} in {counted(value.cycles, 'cycle')}"
+        kind = "largest" if value.id in _LARGEST else "mean"
+        return f"{kind} of {counted(value.cycles, 'cycle')}, {low} to {high}"
     return ""
 
 
@@ -186,9 +189,15 @@ def test_name(value: Value) -> str:
     return TESTS[TEST_OF[value.id]].name
 
 
-def counted_criteria(count: int) -> str:
-    """Return how many criteria, in words."""
-    return f"{count} criteri{'on' if count == 1 else 'a'}"
+def uncovered_tests(values: Sequence[Value]) -> tuple[str, ...]:
+    """Return what of the standard's tests the data do not cover, in words: whole tests by name, else criteria."""
+    covered = {value.id for value in values if value.status != "not-measured"}
+    missing = {test: [name for name in test.criteria if name not in covered] for test in TESTS.values()}
+    return tuple(
+        f"{test.name} ({', '.join(names)})" if len(names) == len(test.criteria) else ", ".join(names)
+        for test, names in missing.items()
+        if names
+    )
 
 
 def _number(number: float, quantity: Quantity) -> str:

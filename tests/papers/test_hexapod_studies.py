@@ -42,21 +42,20 @@ def test_the_irb120() -> None:
     repeatability = medians(study, "Repeatability")
     assert repeatability[one_side] == pytest.approx(0.010, abs=0.006)
     assert repeatability[either] > 2 * repeatability[one_side]
-    of_cups = {
-        way: [repeatability[f"T{cup}, {way}"] for cup in (1, 2, 3)]
+    printed = (0.036, 0.041, 0.043)
+    whole, two, fifth, from_before = (
+        [repeatability[f"T{cup}, {way}"] for cup in (1, 2, 3)]
         for way in (
             "joints come from either side",
             "joints 4 and 6 come from either side",
             "a fifth of the backlash, joints come from either side",
             "each pose always from the one before",
         )
-    }
-    printed = (0.036, 0.041, 0.043)
-    whole, two, fifth, in_turn = of_cups.values()
+    )
     assert two == pytest.approx(whole, rel=0.25)  # what makes our figure
     assert fifth == pytest.approx(printed, rel=0.5)  # and what would make the document's
     assert all(ours > 2 * theirs for ours, theirs in zip(whole, printed, strict=True))
-    assert all(ours < 0.6 * theirs for ours, theirs in zip(in_turn, printed, strict=True))
+    assert all(ours < 0.6 * theirs for ours, theirs in zip(from_before, printed, strict=True))
     spheres = [row for row in study.tables[6].rows if row.what.endswith("standard deviation")]
     assert len(spheres) == 6
     assert all(0.04 < row.median < 0.30 for row in spheres)

@@ -73,6 +73,17 @@ class KnownError:
             return None
         return self.value - half * self.deviation, self.value + half * self.deviation
 
+    @property
+    def summary(self) -> dict[str, Any]:
+        """It as JSON holds it, of a length."""
+        at = None if self.value is None else self.value * 1e3
+        return {
+            "is": self.words,
+            "joints": [*self.joints],
+            "mm": at,
+            "90_mm": _times(self.within(_NORMAL_90), 1e3),
+        }
+
 
 def known_errors(robot: Robot) -> dict[str, KnownError]:
     """Return the joint errors of a robot by their parameters, each with those that are in its value as well.
@@ -179,23 +190,38 @@ class UsedLean:
         return None if ebeta is None or egamma is None else tolerance_of(ebeta, egamma, self.depth)
 
     @property
-    def intervals(self) -> tuple[tuple[float, float], tuple[float, float] | None] | None:
-        """Where delta [m] and its side [rad] lie with 90 % or more; None where no deviations are known.
+    def intervals(self) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+        """Where delta [m] and its side [rad] lie with 90 % or more; None where that is not known, or any side may be.
 
         Both angles lie within their intervals of 95 % in 90 % of the cases or more, however they are correlated
-        (Bonferroni). The side is None where it may be any.
+        (Bonferroni).
         """
-        ends = [angle.within(_NORMAL_95) for angle in self.angles]
-        if self.used is None or ends[0] is None or ends[1] is None:
-            return None
-        (b, b2), (g, g2) = ends[0], ends[1]
+        ebeta, egamma = (angle.within(_NORMAL_95) for angle in self.angles)
+        if self.used is None or ebeta is None or egamma is None:
+            return None, None
+        (b, b2), (g, g2) = ebeta, egamma
         least = tolerance_of(max(b, -b2, 0.0), max(g, -g2, 0.0), self.depth).delta
         largest = tolerance_of(max(-b, b2), max(-g, g2), self.depth).delta
         if least == 0.0:
             return (0.0, largest), None
-        corners = [tolerance_of(x, y, self.depth).towards - self.used.towards for x in (b, b2) for y in (g, g2)]
-        turned = [math.remainder(corner, math.tau) for corner in corners]
-        return (least, largest), (self.used.towards + min(turned), self.used.towards + max(turned))
+        middle = self.used.towards
+        corners = [tolerance_of(x, y, self.depth).towards for x in ebeta for y in egamma]
+        turned = [math.remainder(corner - middle, math.tau) for corner in corners]
+        return (least, largest), (middle + min(turned), middle + max(turned))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """It as JSON holds it."""
+        used, (delta, side) = self.used, self.intervals
+        return {
+            "is": ", ".join(angle.words for angle in self.angles),
+            "joints": sorted({joint for angle in self.angles for joint in angle.joints}),
+            "depth_mm": self.depth * 1e3,
+            "lean_mm": None if used is None else used.delta * 1e3,
+            "lean_90_mm": _times(delta, 1e3),
+            "towards_deg": None if used is None else math.degrees(used.towards),
+            "towards_90_deg": _times(side, math.degrees(1.0)),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -211,61 +237,34 @@ class UsedTolerances(Record):
     def blocks(self) -> Iterator[Block]:
         """Give how far each axis leans, and where each joint is beside its place, in mm and deg."""
         yield say(robot=self.robot)
-        leans = [_lean_summary(lean) for lean in self.leans]
+        leans, places = [lean.summary for lean in self.leans], [place.summary for place in self.places]
         heading = ("lean", "joints", "depth [mm]", "[mm]", "90 %", "towards [deg]", "90 %")
         shown = [
             (
                 *_named(row),
                 f"{row['depth_mm']:.1f}",
-                *_shown(row["lean_mm"], row["lean_90_mm"], 4),
-                *_shown(
-                    row["towards_deg"], row["towards_90_deg"], 1, "not known" if row["lean_90_mm"] is None else "any"
-                ),
+                *_shown(row["lean_mm"], row["lean_90_mm"], ".4f"),
+                *_shown(row["towards_deg"], row["towards_90_deg"], ".1f", "any" if row["lean_90_mm"] else _NOT_KNOWN),
             )
             for row in leans
         ]
         yield Table(heading, shown, in_json={"leans": leans})
-        places = [
-            {
-                "is": p.words,
-                "joints": [*p.joints],
-                "mm": _times(p.value, 1e3),
-                "90_mm": _pair(p.within(_NORMAL_90), 1e3),
-            }
-            for p in self.places
-        ]
-        rows = [(*_named(row), *_shown(row["mm"], row["90_mm"], 4)) for row in places]
+        rows = [(*_named(row), *_shown(row["mm"], row["90_mm"], ".4f")) for row in places]
         yield Table(("position", "joints", "[mm]", "90 %"), rows, in_json={"positions": places})
         known = [*self.places, *(angle for lean in self.leans for angle in lean.angles)]
-        yield say(
-            "Of a sum it is not known which of its errors has how much of it."
-            if any(" " in e.words for e in known)
-            else "",
-            "Unknown: measurements did not see it, or only in a sum." if any(e.value is None for e in known) else "",
-            "The robot file states no deviations, so that intervals are not known."
-            if all(e.deviation is None for e in known)
-            else "",
-        )
+        for is_so, words in (
+            (any(" " in e.words for e in known), "Of a sum it is not known which of its errors has how much of it."),
+            (any(e.value is None for e in known), "Unknown: measurements did not see it, or only in a sum."),
+            (all(e.deviation is None for e in known), "The robot file states no deviations: intervals are not known."),
+        ):
+            yield say(words if is_so else "")
 
 
-def _lean_summary(lean: UsedLean) -> dict[str, Any]:
-    used, intervals = lean.used, lean.intervals
-    return {
-        "is": ", ".join(angle.words for angle in lean.angles),
-        "joints": sorted({joint for angle in lean.angles for joint in angle.joints}),
-        "depth_mm": lean.depth * 1e3,
-        "lean_mm": _times(used and used.delta, 1e3),
-        "lean_90_mm": _pair(intervals and intervals[0], 1e3),
-        "towards_deg": _times(used and used.towards, math.degrees(1.0)),
-        "towards_90_deg": _pair(intervals and intervals[1], math.degrees(1.0)),
-    }
+#: What is printed for an interval where no deviation is stated.
+_NOT_KNOWN: Final = "not known"
 
 
-def _times(value: float | None, scale: float) -> float | None:
-    return None if value is None else value * scale
-
-
-def _pair(ends: tuple[float, float] | None, scale: float) -> list[float] | None:
+def _times(ends: tuple[float, float] | None, scale: float) -> list[float] | None:
     return None if ends is None else [end * scale for end in ends]
 
 
@@ -273,11 +272,11 @@ def _named(row: dict[str, Any]) -> tuple[str, str]:
     return row["is"], ", ".join(map(str, row["joints"]))
 
 
-def _shown(value: float | None, ends: list[float] | None, digits: int, without: str = "not known") -> tuple[str, str]:
+def _shown(value: float | None, ends: list[float] | None, form: str, without: str = _NOT_KNOWN) -> tuple[str, str]:
     """Return a figure and its interval as cells."""
     if value is None:
         return "unknown", ""
-    return f"{value:.{digits}f}", without if ends is None else f"{ends[0]:.{digits}f} to {ends[1]:.{digits}f}"
+    return f"{value:{form}}", without if ends is None else f"{ends[0]:{form}} to {ends[1]:{form}}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -338,9 +337,12 @@ def judged(asked: JudgeTolerance) -> UsedTolerances | AllowedErrors:
     if asked.lean is None and asked.position is None:
         with refusals_of("robot"):
             known = known_errors(robot)
-        leans = tuple(UsedLean(d, (known[f"ebeta_{i}"], known[f"egamma_{i}"])) for i, d in enumerate(depths, 1))
-        places = tuple(known[f"{slide}_{i}"] for i in range(1, count + 1) for slide in ("ex", "ey", "ez"))
-        return UsedTolerances(robot.name, leans, places, robot.simulated_from)
+        return UsedTolerances(
+            robot.name,
+            tuple(UsedLean(d, (known[f"ebeta_{i}"], known[f"egamma_{i}"])) for i, d in enumerate(depths, 1)),
+            tuple(known[f"{slide}_{i}"] for i in range(1, count + 1) for slide in ("ex", "ey", "ez")),
+            robot.simulated_from,
+        )
     leans = lengths_argument(0.0 if asked.lean is None else asked.lean, "lean", count, 0.0, one_for_all=True)
     positions = lengths_argument(
         0.0 if asked.position is None else asked.position, "position", count, 0.0, one_for_all=True

@@ -6,8 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from tests.honesty.telling import told, written
+import pytest
+from tests.honesty.telling import Told, told, written
+from tests.simulated import campaign
 
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.robot.chain import Array
 from truearm.engine.robot.conversion import converted
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.robot_file.writing import robot_text
@@ -52,3 +56,52 @@ def test_errors_that_are_all_known_are_no_sums(tmp_path: Path) -> None:
     assert [row["is"] for row in rows] == [f"{slide}_{i}" for i in range(1, 7) for slide in ("ex", "ey", "ez")]
     assert [row["joints"] for row in rows] == [[i] for i in range(1, 7) for _ in range(3)]
     assert all(row["mm"] is not None and row["90_mm"] is not None for row in rows)
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Dataset]:
+    """Return a calibrated robot, and readings that it was not calibrated with."""
+    folder = tmp_path_factory.mktemp("calibrated")
+    twin, data = campaign("irb120", 40, 2e-5, 3)
+    assert told("calibrate", "irb120", written(folder, data), "--model", "geometric", "--out", folder / "out").code == 0
+    joints = twin.robot.random_configurations(12, np.random.default_rng(1))
+    return folder / "out" / "calibrated.yaml", measure(twin, joints, 2e-5, np.random.default_rng(2))
+
+
+def validated(calibrated: tuple[Path, Dataset], folder: Path, joints: Array, position: Array) -> Told:
+    robot, data = calibrated
+    shape = (len(joints), len(data.targets), 3)
+    again = Dataset.of(joints, position.reshape(shape), targets=data.targets, sigma=2e-5, source="check")
+    return told("validate", robot, written(folder, again))
+
+
+def test_rows_that_were_copied_show_no_repeatability(calibrated: tuple[Path, Dataset], tmp_path: Path) -> None:
+    _, data = calibrated
+    joints, position = np.tile(data.joints, (2, 1)), np.tile(data.position, (2, 1))
+    answer = validated(calibrated, tmp_path, joints, position)
+    assert answer.says("duplicates", "warning", "Rows were copied")
+    assert answer.summary["least_error"]["position_mm"]["evidence"] == "declared"
+    # read anew, they do
+    anew = position + np.random.default_rng(3).normal(0.0, 2e-5, position.shape)
+    answer = validated(calibrated, tmp_path, joints, anew)
+    assert "duplicates" not in answer.levels
+    assert answer.summary["least_error"]["position_mm"]["evidence"] == "visits"
+
+
+@pytest.mark.parametrize("wild", [1, 3])
+def test_a_few_wild_readings_are_named_before_the_robot_is_doubted(
+    wild: int, calibrated: tuple[Path, Dataset], tmp_path: Path
+) -> None:
+    _, data = calibrated
+    off = np.zeros_like(data.position)
+    off[4 : 4 + wild] = [0.0, 5e-3, 0.0]
+    answer = validated(calibrated, tmp_path, data.joints, data.position + off)
+    assert answer.says(
+        "beyond-proof", "warning", f"That comes from {wild} reading.*: 2 at 2.*before you doubt the robot"
+    )
+    assert "The robot changed" not in answer.messages["beyond-proof"]
+    # the robot that changed is doubted, and the one that did not is not
+    bent = data.joints + 0.002 * np.eye(6)[2]
+    changed = validated(calibrated, tmp_path, bent, data.position)
+    assert changed.says("beyond-proof", "error", "The robot changed since")
+    assert "beyond-proof" not in validated(calibrated, tmp_path, data.joints, data.position).levels

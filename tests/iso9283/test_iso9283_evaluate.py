@@ -136,6 +136,11 @@ def test_corner_deviations_say_that_they_are_means_and_how_large_the_largest_is(
         assert corner.value == pytest.approx(cycles.mean())
         least, largest = (f"{1e3 * length:.4f}" for length in (cycles.min(), cycles.max()))
         assert beside_words(corner) == f"mean of 3 cycles, {least} to {largest}"
+    for criterion in ("t", "posing-time", "WS", "WF", "compliance"):
+        assert beside_words(next(iter(positions(result, criterion).values()))).startswith("mean of 3 cycles, ")
+    # AP of few cycles is the distance of their middle, and not the mean of their distances
+    few = replace(next(iter(positions(result, "AP").values())), interval=None, least=1e-3, largest=2e-3, cycles=4)
+    assert beside_words(few) == "4 cycles, 1.0000 to 2.0000"
     (overshoot,) = positions(result, "OV").values()
     assert overshoot.value == overshoot.largest
     assert beside_words(overshoot).startswith("largest of 3 cycles, ")

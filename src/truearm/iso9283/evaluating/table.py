@@ -26,8 +26,11 @@ UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {
     "compliance": ("mm/N", 1e3),
 }
 _DECIMALS: Final[Mapping[Quantity, int]] = {"length": 4, "angle": 4, "time": 3, "ratio": 3, "speed": 2, "compliance": 6}
-#: Criteria that are the largest of their cycles; others that have a range are the mean.
-_LARGEST: Final = ("OV", "FV")
+#: What a criterion is of its cycles, where that is their mean or their largest; AP, for one, is neither.
+_OF_CYCLES: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("t", "posing-time", "CR", "CO", "WS", "WF", "compliance"), "mean of "),
+    **dict.fromkeys(("OV", "FV"), "largest of "),
+}
 #: Columns of :attr:`Worst.cells`.
 HEADING: Final = ("Criterion", "Worst place", "Value", "95 %, or range", "Other velocities", "Status")
 #: Where the value is the worst of several places already.
@@ -115,8 +118,7 @@ def beside_words(value: Value) -> str:
         return f"{low} to {high}"
     if value.least is not None and value.largest is not None:
         low, high = (_number(end, value.quantity) for end in (value.least, value.largest))
-        kind = "largest" if value.id in _LARGEST else "mean"
-        return f"{kind} of {counted(value.cycles, 'cycle')}, {low} to {high}"
+        return f"{_OF_CYCLES.get(value.id, '')}{counted(value.cycles, 'cycle')}, {low} to {high}"
     return ""
 
 

@@ -76,7 +76,7 @@ def test_tolerances_of_one_depth_are_those_of_the_same_depth_each(calibration: A
     single, each = package.tolerance(robot, 0.05), package.tolerance(robot, [0.05] * 6)
     assert isinstance(single, UsedTolerances)
     assert single.summary() == each.summary()
-    assert single.joints[1].delta == pytest.approx(0.05 * np.tan(np.radians(0.1814)), abs=1e-5)
+    assert known(single.leans[1].used).delta == pytest.approx(0.05 * np.tan(np.radians(0.1814)), abs=1e-5)
     allowed = package.tolerance(robot, 0.05, lean=2e-5, position=(1e-4, 0, 0, 0, 0, 0))
     assert isinstance(allowed, AllowedErrors)
     worst, root = allowed.errors.together
@@ -122,7 +122,7 @@ def test_the_commands_take_millimetres_and_say_the_same(truearm: Truearm, data: 
     assert "ez_6 (moves the flange)" in truearm(*words, "--details").out
     errors = out / "joint-errors.yaml"
     tolerances = json.loads(truearm("tolerance", errors, "--depth", "50", "--json").out)
-    assert tolerances["joints"][1]["lean_mm"] == pytest.approx(50 * np.tan(np.radians(0.1814)), abs=0.01)
+    assert tolerances["leans"][1]["lean_mm"] == pytest.approx(50 * np.tan(np.radians(0.1814)), abs=0.01)
     allowed = json.loads(truearm("tolerance", "kr5", "--depth", "50", "--lean", "0.02", "--json").out)
     assert allowed["together"]["worst_mm"] > allowed["together"]["root_of_squares_mm"] > 0.3
     lines = ("lines", "kr5", "--centre", "850,0,600", "--joint-errors", errors, "--truth", "axis-tests")

@@ -25,7 +25,7 @@ from truearm.engine.data.hexapod import (
 )
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.transform import rigid_motion
-from truearm.hexapod.places import all_solutions, cup_monte_carlo, cup_uncertainty, world_frame
+from truearm.hexapod.places import all_solutions, cup_monte_carlo, cup_uncertainty, radius_95, world_frame
 from truearm.hexapod.rehearsal import ballbar, measured_legs, measured_sides
 
 #: Nubiola, section 3.2: the three groups of near pairs, from the closest.
@@ -167,6 +167,28 @@ def test_monte_carlo_finds_the_correlated_figures() -> None:
         assert cup_monte_carlo(solution, 40_000, rng) == pytest.approx(u.norms, rel=0.01)
     with pytest.raises(InputError, match="two trials"):
         cup_monte_carlo(1, 1, rng)
+
+
+def test_radii_of_95_percent_hold_that_many_of_measured_cups() -> None:
+    """1.96 times the root of the summed variances does not: it is a half-width along a line."""
+    rng, nominal = np.random.default_rng(8), np.repeat([DEVICE.base, DEVICE.tool, DEVICE.leg], (3, 3, 6))
+    d = nominal[:, None] + DEVICE.sigma * rng.standard_normal((12, 200_000))
+    worst = []
+    for solution, u in all_solutions().items():
+        cups, true = (tool_cups(Design((0, 1, 2), (0, 1, 2)), solution, x[:3], x[3:6], x[6:]) for x in (d, nominal))
+        away = np.linalg.norm(cups - true[:, :, None], axis=1)
+        radii = np.array(u.radii) * DEVICE.sigma
+        assert (away < radii[:, None]).mean(axis=1) == pytest.approx([0.95] * 3, abs=0.002)
+        worst.append((radii[2], (away[2] < 1.96 * u.norms[2] * DEVICE.sigma).mean()))
+    assert worst[0] == pytest.approx((3.024e-6, 0.972), rel=2e-3)
+    assert max(radius for radius, _ in worst) == worst[0][0]
+
+
+def test_a_radius_of_95_percent_is_that_of_the_tables() -> None:
+    """Of chi with one, two and three degrees of freedom."""
+    for sizes, radius in (((4.0, 0.0, 0.0), 2 * 1.959964), ((0.0, 1.0, 1.0), 2.447747), ((1.0, 1.0, 1.0), 2.795483)):
+        R, _ = np.linalg.qr(np.random.default_rng(9).standard_normal((3, 3)))
+        assert radius_95(R @ np.diag(sizes) @ R.T) == pytest.approx(radius, rel=1e-6)
 
 
 def test_the_covariance_is_that_of_central_differences_at_other_lengths() -> None:

@@ -24,11 +24,15 @@ BASE, TOOL = ("B1-B2", "B2-B3", "B3-B1"), ("T1-T2", "T2-T3", "T3-T1")
 def test_uncertainty(truearm: Truearm) -> None:
     summary = json.loads(truearm("hexapod", "uncertainty", "--trials", "20000", "--json").out)
     assert list(summary) == ["solutions", "monte_carlo"]
-    assert [list(row) for row in summary["solutions"]] == [["t1", "t2", "t3", "t3_as_printed"]] * 4
+    assert [list(row) for row in summary["solutions"]] == [["t1", "t2", "t3", "t3_as_printed", "radius_95_um"]] * 4
+    assert [row["radius_95_um"]["t3"] for row in summary["solutions"]] == pytest.approx(
+        [3.024, 2.660, 2.482, 2.995], abs=5e-4
+    )
     assert [row["t3"] for row in summary["solutions"]] == pytest.approx([3.359, 3.052, 2.886, 3.331], abs=5e-4)
     for row, drawn in zip(summary["solutions"], summary["monte_carlo"], strict=True):
         assert drawn == pytest.approx({key: row[key] for key in drawn}, rel=0.02)
-    assert "3.359" in truearm("hexapod", "uncertainty", "--trials", "100").out
+    first = truearm("hexapod", "uncertainty", "--trials", "100").out.splitlines()[1].split()
+    assert (first[3], first[-3:]) == ("3.359", ["1.976", "2.288", "3.024"])
 
 
 def test_from_plan_to_data(truearm: Truearm, tmp_path: Path) -> None:

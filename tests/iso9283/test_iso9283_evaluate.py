@@ -24,7 +24,7 @@ from truearm.engine.twin.truths import truth_twin
 from truearm.iso9283.criteria.poses import missing_places
 from truearm.iso9283.criteria.rows import Conditions, Value
 from truearm.iso9283.evaluating.evaluate import RESULT, Iso9283Evaluation
-from truearm.iso9283.evaluating.table import cycle_notices, worst_places
+from truearm.iso9283.evaluating.table import beside_words, cycle_notices, uncovered_tests, worst_places
 from truearm.iso9283.planning.criteria import TEST_OF, TESTS
 
 #: A few cycles of every test.
@@ -115,6 +115,37 @@ def test_the_report_has_a_picture_of_every_test_and_stays_small(result: Iso9283E
     assert len(page) < 1e6  # without Plotly's own script, which is left out here
 
 
+def test_a_campaign_of_all_tests_covers_all(result: Iso9283Evaluation) -> None:
+    assert f"from {len(TESTS)} of {len(TESTS)} tests." in result.lines()[1]
+    assert result.summary()["not_measured"] == []
+    assert not any(line.startswith("Not measured") for line in result.lines())
+
+
+def test_a_part_of_a_test_is_named_by_its_criteria(result: Iso9283Evaluation) -> None:
+    """Without orientations a test has its positions only; a criterion without any value is not covered."""
+    values = [replace(v, status="not-measured") if v.id in {"RP", "E"} else v for v in result.values]
+    assert uncovered_tests(values) == ("RP", "exchangeability (E)")
+
+
+def test_corner_deviations_say_that_they_are_means_and_how_large_the_largest_is(result: Iso9283Evaluation) -> None:
+    corners = [*positions(result, "CR").values(), *positions(result, "CO").values()]
+    assert len(corners) == 6
+    for corner in corners:
+        curves = next(c for c in result.evaluation.corners if c.where == corner.where)
+        cycles = curves.rounding if corner.id == "CR" else curves.overshoot
+        assert corner.value == pytest.approx(cycles.mean())
+        least, largest = (f"{1e3 * length:.4f}" for length in (cycles.min(), cycles.max()))
+        assert beside_words(corner) == f"mean of 3 cycles, {least} to {largest}"
+    for criterion in ("t", "posing-time", "WS", "WF", "compliance"):
+        assert beside_words(next(iter(positions(result, criterion).values()))).startswith("mean of 3 cycles, ")
+    # AP of few cycles is the distance of their middle, and not the mean of their distances
+    few = replace(next(iter(positions(result, "AP").values())), interval=None, least=1e-3, largest=2e-3, cycles=4)
+    assert beside_words(few) == "4 cycles, 1.0000 to 2.0000"
+    (overshoot,) = positions(result, "OV").values()
+    assert overshoot.value == overshoot.largest
+    assert beside_words(overshoot).startswith("largest of 3 cycles, ")
+
+
 def test_streams_without_cycles_are_drawn_as_what_was_found_in_them(small: Arguments) -> None:
     cycle, start, last = "1", 0.0, 0.0
 
@@ -133,7 +164,17 @@ def test_streams_without_cycles_are_drawn_as_what_was_found_in_them(small: Argum
 
 def test_what_was_not_measured_is_said(small: Arguments) -> None:
     result = evaluated(small, "forces")
-    assert "Not measured: AP, RP, t, OV, AV, RV, FV." in result.lines()
+    (said,) = [line for line in result.lines() if line.startswith("Not measured: ")]
+    assert result.lines()[1].endswith(": 6 values from 1 of 13 tests.")
+    named = said.removeprefix("Not measured: ").removesuffix(".").split("; ")
+    assert named == list(result.summary()["not_measured"])
+    # planned and not measured, or not planned: both are not covered
+    assert named[:2] == [
+        "pose accuracy and repeatability (AP, RP)",
+        "multi-directional pose accuracy variation (vAP)",
+    ]
+    assert len(named) == 12
+    assert said in result.contents()["report.html"]
     (absent,) = [entry for entry in result.summary()["criteria"] if entry["id"] == "AP"]
     assert absent == {**absent, "value": None, "interval_95": None, "cycles": 0, "status": "not-measured"}
 

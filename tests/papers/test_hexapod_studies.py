@@ -9,12 +9,16 @@ from tests.papers.small import medians, small
 def test_the_device() -> None:
     study = small("hexapod-device")
     counts, uncertainty, accuracy, drift, changer, repeated, fourth = study.tables
-    assert {row.verdict for row in counts.rows[:8] if row.published is not None} == {"agrees"}
+    assert {row.verdict for row in counts.rows[:5]} == {"agrees"}
+    # Poses are numbered by the printed pairs, which then are no evidence.
+    groups = [row for row in counts.rows if row.what.endswith("pairs as printed")]
+    assert [(row.median, row.verdict) for row in groups] == [(6, "by construction")] * 3
     assert {row.verdict for row in counts.rows[-2:]} == {"same order", "not worse"}
     # The document's way gives its figures; only t3 differs, where it leaves correlations out.
     differing = {row.what for row in uncertainty.rows if row.verdict == "differs"}
     assert differing == {f"solution {solution}, t3" for solution in (1, 2, 3, 4)}
     assert all(row.verdict == "differs" for row in accuracy.rows if row.published is not None)
+    assert next(row.median for row in accuracy.rows if row.what == "at 95 %") == pytest.approx(3.024, abs=5e-4)
     found = medians(study, "Drift of the bar")
     assert found["put on its calibrator before each pose: mean"] < 1.3 * found["a bar that does not drift: mean"]
     assert found["never put on its calibrator: mean"] > 1.5 * found["a bar that does not drift: mean"]
@@ -38,6 +42,20 @@ def test_the_irb120() -> None:
     repeatability = medians(study, "Repeatability")
     assert repeatability[one_side] == pytest.approx(0.010, abs=0.006)
     assert repeatability[either] > 2 * repeatability[one_side]
+    printed = (0.036, 0.041, 0.043)
+    whole, two, fifth, from_before = (
+        [repeatability[f"T{cup}, {way}"] for cup in (1, 2, 3)]
+        for way in (
+            "joints come from either side",
+            "joints 4 and 6 come from either side",
+            "a fifth of the backlash, joints come from either side",
+            "each pose always from the one before",
+        )
+    )
+    assert two == pytest.approx(whole, rel=0.25)  # what makes our figure
+    assert fifth == pytest.approx(printed, rel=0.5)  # and what would make the document's
+    assert all(ours > 2 * theirs for ours, theirs in zip(whole, printed, strict=True))
+    assert all(ours < 0.6 * theirs for ours, theirs in zip(from_before, printed, strict=True))
     spheres = [row for row in study.tables[6].rows if row.what.endswith("standard deviation")]
     assert len(spheres) == 6
     assert all(0.04 < row.median < 0.30 for row in spheres)

@@ -1,19 +1,33 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.axis_circles.test_axes import runs
 from tests.engine.robot.test_conventions import about
 from tests.engine.robot.test_joint_errors import TABLE_3, with_table_3
 
 import truearm
+from truearm.axis_circles.fit import AxisFit, analyse
 from truearm.engine.base.errors import InputError
+from truearm.engine.fit.problem import in_words
 from truearm.engine.robot.conversion import converted
+from truearm.engine.robot.parameters import FreeParameters
+from truearm.engine.robot.transform import IDENTITY
+from truearm.engine.twin.twin import Twin, measure
 from truearm.validation.lines import CONVENTION
-from truearm.validation.tolerances import errors_of_tolerance, flange_error, joint_tolerances, tolerance_of
+from truearm.validation.tolerances import (
+    KnownError,
+    UsedLean,
+    errors_of_tolerance,
+    flange_error,
+    known_errors,
+    tolerance_of,
+)
 
 
 @pytest.mark.parametrize("towards", [-3.0, -1.0, 0.0, 0.7, math.pi / 2, 2.5])
@@ -34,10 +48,57 @@ def test_small_angles_are_equation_20() -> None:
 
 
 def test_tolerances_of_the_kr5_follow_table_3() -> None:
-    result = joint_tolerances(with_table_3(), [0.05] * 6)
-    for tolerance, (ebeta, egamma, *place) in zip(result, TABLE_3, strict=True):
-        assert tolerance.delta == pytest.approx(0.05 * math.radians(math.hypot(ebeta, egamma)), rel=1e-4)
-        assert_allclose(np.array(tolerance.position) * 1e3, place, atol=1e-12)
+    known = known_errors(with_table_3())
+    for i, (ebeta, egamma, *place) in enumerate(TABLE_3, 1):
+        used = UsedLean(0.05, (known[f"ebeta_{i}"], known[f"egamma_{i}"])).used
+        assert used is not None
+        assert used.delta == pytest.approx(0.05 * math.radians(math.hypot(ebeta, egamma)), rel=1e-4)
+        assert [known[f"{slide}_{i}"].value for slide in ("ex", "ey", "ez")] == pytest.approx(np.array(place) / 1e3)
+
+
+@pytest.mark.parametrize("correlation", [-0.95, 0.0, 0.95])
+@pytest.mark.parametrize("leaning", [0.0, 1.0, 4.0])
+def test_lean_and_side_lie_in_their_intervals_as_often_as_stated(leaning: float, correlation: float) -> None:
+    """However the two angles are correlated, which the file does not say."""
+    rng, deviations, inside = np.random.default_rng(0), np.array([2e-5, 5e-5]), np.zeros(2)
+    true = leaning * deviations * [1.0, -1.0]
+    truth = tolerance_of(float(true[0]), float(true[1]), 0.05)
+    factor = np.linalg.cholesky(np.array([[1.0, correlation], [correlation, 1.0]]))
+    for found in true + rng.standard_normal((1000, 2)) @ factor.T * deviations:
+        angles = [KnownError("", (1,), v, d) for v, d in zip(found.tolist(), deviations.tolist(), strict=True)]
+        delta, side = UsedLean(0.05, (angles[0], angles[1])).intervals
+        assert delta is not None
+        inside[0] += delta[0] <= truth.delta <= delta[1]
+        inside[1] += side is None or (truth.towards - side[0]) % math.tau <= side[1] - side[0]
+    assert inside.min() >= 900
+    assert leaning < 2.0 or inside.min() <= 990  # one of them is not wider than it must be
+
+
+def test_each_figure_says_which_parameters_it_is_the_sum_of(axis_errors: AxisFit) -> None:
+    """As the fit itself has the sums; the file knows only which errors were held."""
+    known = known_errors(axis_errors.robot)
+    everything = FreeParameters(tuple(axis_errors.robot.parameters.values()))
+    found = [name for name in axis_errors.free.names if name in known]
+    for name in found:
+        members = {n: w for n, w in axis_errors.combination(name).items() if abs(w) > 1e-6}
+        assert sorted(known[name].words.split(" + ")) == sorted(in_words(members, everything, summed=True).split(" + "))
+    assert {name for name, error in known.items() if error.value is None} == set(known) - set(found)
+
+
+@pytest.fixture(scope="module", params=["robot", "world"])
+def axis_errors(request: pytest.FixtureRequest) -> AxisFit:
+    """What circles say of joint errors, in the robot's frame and in the instrument's."""
+    true = with_table_3().with_values({"ebeta_2": 0.002}).with_frames(IDENTITY, {"smr": (0.1, 0.05, 0.03)})
+    data = measure(Twin(true), runs(20.0, (0, -90, 90, 0, 30, 0)), 1e-6, np.random.default_rng(0))
+    return analyse(truearm.load_robot("kr5"), data, in_robot_frame=request.param == "robot").errors
+
+
+def test_the_factors_of_a_sum_are_in_its_own_unit(axis_errors: AxisFit) -> None:
+    """A lean of axis 2 shifts it by the 120 mm that its joint is aside of axis 1, where the base takes the lean."""
+    is_in_base = axis_errors.robot.parameters["ebeta_2"].deviation is None
+    error = known_errors(axis_errors.robot)["ex_2"]
+    assert error.words == ("ex_2 + 120 mm/rad·ebeta_2" if is_in_base else "ex_2")
+    assert error.value == pytest.approx(-0.4168e-3 + 0.120 * 0.002 * is_in_base, abs=1e-5)
 
 
 def test_no_draw_within_the_tolerances_does_more_than_the_worst() -> None:
@@ -78,18 +139,36 @@ def test_the_worst_side_of_one_joint_is_met() -> None:
 
 def test_the_job_says_what_errors_use_in_millimetres_and_degrees() -> None:
     robot, depths = with_table_3(), [0.05, 0.06, 0.05, 0.05, 0.05, 0.07]
+    robot = robot.with_parameters(
+        replace(p, deviation=1e-5) for p in robot.parameters.values() if p.group == "geometry"
+    )
     result = truearm.tolerance(robot, depths)
     content = result.summary()
     assert content["robot"] == robot.name
-    rows = [line.split() for line in result.lines() if line.split()[0].isdigit()]
-    for row, shown, depth, used in zip(content["joints"], rows, depths, joint_tolerances(robot, depths), strict=True):
-        assert row["depth_mm"] == pytest.approx(1e3 * depth)
-        assert row["lean_mm"] == pytest.approx(1e3 * used.delta)
-        assert row["towards_deg"] == pytest.approx(math.degrees(used.towards))
-        assert row["position_mm"] == pytest.approx(1e3 * np.array(used.position))
-        place = ", ".join(f"{1e3 * v:.4f}" for v in used.position)
-        figures = [f"{1e3 * depth:.1f}", f"{1e3 * used.delta:.4f}", f"{math.degrees(used.towards):.1f}"]
-        assert shown == [str(row["joint"]), *figures, *place.split()]
+    for i, (row, depth, (ebeta, egamma, *_)) in enumerate(zip(content["leans"], depths, TABLE_3, strict=True), 1):
+        used = tolerance_of(math.radians(ebeta), math.radians(egamma), depth)
+        assert (row["is"], row["joints"]) == (f"ebeta_{i}, egamma_{i}", [i])
+        figures = (row["depth_mm"], row["lean_mm"], row["towards_deg"])
+        assert figures == pytest.approx((1e3 * depth, 1e3 * used.delta, math.degrees(used.towards)))
+        least, largest = row["lean_90_mm"]
+        assert least < row["lean_mm"] < largest
+        shown = f"{figures[0]:.1f} {figures[1]:.4f} {least:.4f} to {largest:.4f} {figures[2]:.1f}"
+        assert " ".join(result.lines()[i].split()).startswith(f"ebeta_{i}, egamma_{i} {i} {shown}")
+    slides = [value for row in TABLE_3 for value in row[2:]]
+    for row, value, line in zip(content["positions"], slides, result.lines()[8:], strict=True):
+        assert row["mm"] == pytest.approx(value)
+        assert row["90_mm"] == pytest.approx([value - 1.645e-2, value + 1.645e-2], abs=1e-5)
+        low, high = row["90_mm"]
+        assert line.split() == [row["is"], str(row["joints"][0]), f"{value:.4f}", f"{low:.4f}", "to", f"{high:.4f}"]
+
+
+def test_without_deviations_intervals_are_not_known_and_without_errors_there_is_nothing_to_say() -> None:
+    result = truearm.tolerance(with_table_3(), 0.05)
+    assert all(row["lean_90_mm"] is row["towards_90_deg"] is None for row in result.summary()["leans"])
+    assert all(row["90_mm"] is None and row["mm"] for row in result.summary()["positions"])
+    assert result.lines()[-1] == "The robot file states no deviations: intervals are not known."
+    with pytest.raises(InputError, match="the robot file has no joint errors: all of them are zero"):
+        truearm.tolerance(converted(truearm.load_robot("kr5"), CONVENTION), 0.05)
 
 
 def test_the_job_says_what_tolerances_allow_at_the_flange() -> None:

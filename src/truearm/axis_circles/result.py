@@ -156,7 +156,9 @@ def joint_errors(fit: AxisFit) -> Iterator[Block]:
     parameters = [p for p in fit.free.parameters if p.group != "base"]
     unseen = f"{counted(len(fit.redundancies), 'combination')} of errors unobservable with circles and held"
     yield say(f"Joint errors: {len(parameters)} found, in 95 % intervals; {unseen}:")
-    yield each("found", (_joint_error(p, in_words(fit.combination(p.name), everything)) for p in parameters))
+    yield each(
+        "found", (_joint_error(p, in_words(fit.combination(p.name), everything, summed=True)) for p in parameters)
+    )
     yield detail("Unobservable with circles, and held at their nominal values:")
     yield each("unseen", (_unseen(r, moves_flange=r.dropped in fit.moving_flange) for r in fit.redundancies))
 

@@ -71,6 +71,10 @@ DESIGN: Final = Design((0, 1, 2), (0, 1, 2))
 _FREE_OF_BASE: Final = ((1, 0), (2, 0), (2, 1))
 
 
+#: Nodes of the quadrature over each angle of a direction: thirty leave 1e-9 of a radius.
+_NODES: Final = 30
+
+
 # How well the tool's cups are known, in standard deviations of one measured length (Nubiola, 3.4, Table 3.1).
 #
 # Twelve distances and twelve coordinates: three of the base, whose frame the cups themselves make, and nine of the
@@ -90,6 +94,29 @@ class CupUncertainty:
         """Root of the summed variances of T1, T2 and T3."""
         t1, t2, t3 = np.sqrt(np.diag(self.covariance).reshape(3, 3).sum(axis=1)).tolist()
         return t1, t2, t3
+
+    @property
+    def radii(self) -> tuple[float, float, float]:
+        """Radius about each of T1, T2 and T3 that holds it in 95 of 100 cases."""
+        t1, t2, t3 = (radius_95(self.covariance[i : i + 3, i : i + 3]) for i in (0, 3, 6))
+        return t1, t2, t3
+
+
+# Along a direction w of the whitened space, which is uniform on the sphere, a point is within r if chi of three degrees
+# of freedom is below r / |L w|, with L L^T the covariance. Squares of w and eigenvalues are enough, and one octant.
+def radius_95(covariance: Array) -> float:
+    """Return the radius that holds a normal point in space in 95 of 100 cases, of its covariance ``(3, 3)``."""
+    from scipy.optimize import brentq
+    from scipy.special import gammainc
+
+    sizes = np.linalg.eigvalsh(covariance)
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    up, turn = np.meshgrid(0.5 + 0.5 * nodes, 0.25 * np.pi * (1.0 + nodes))
+    across = 1.0 - up**2
+    squares = sizes[0] * across * np.cos(turn) ** 2 + sizes[1] * across * np.sin(turn) ** 2 + sizes[2] * up**2
+    shares = 0.25 * np.outer(weights, weights)
+    largest = 3.0 * float(np.sqrt(sizes.max()))
+    return float(brentq(lambda r: (shares * gammainc(1.5, r**2 / (2.0 * squares))).sum() - 0.95, 0.0, largest))
 
 
 def cup_uncertainty(

@@ -53,7 +53,7 @@ class HexapodPoses(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HexapodUncertainty(Record):
-    """How well the tool's cups are known, in standard deviations of one length."""
+    """How well the tool's cups are known: standard deviations in those of one length, and radii of 95 %."""
 
     solutions: tuple[CupUncertainty, ...]  #: Propagated, for each of the four ways to assemble a design.
     drawn: tuple[tuple[float, float, float], ...]  #: The same by Monte Carlo: T1, T2, T3 of each solution.
@@ -62,13 +62,20 @@ class HexapodUncertainty(Record):
         """Give both for each solution."""
         printed = [float(np.linalg.norm(solution.third_as_printed)) for solution in self.solutions]
         norms = [solution.norms for solution in self.solutions]
+        radii = [[DEVICE.sigma * 1e6 * radius for radius in solution.radii] for solution in self.solutions]
         yield say(
-            "solution     t1     t2     t3   t3 as printed   Monte Carlo: t1     t2     t3   [sigma]",
+            "solution     t1     t2     t3   t3 as printed   Monte Carlo: t1     t2     t3   [sigma]   "
+            "95 % within: t1     t2     t3   [um]",
             *(
-                f"{number:8}  {_three(row)}  {third:14.3f}  {_three(again):>32}"
-                for number, (row, third, again) in enumerate(zip(norms, printed, self.drawn, strict=True), 1)
+                f"{number:8}  {_three(row)}  {third:14.3f}  {_three(again):>32}  {_three(around):>41}"
+                for number, (row, third, again, around) in enumerate(
+                    zip(norms, printed, self.drawn, radii, strict=True), 1
+                )
             ),
-            solutions=[_by_cup(row) | {"t3_as_printed": third} for row, third in zip(norms, printed, strict=True)],
+            solutions=[
+                _by_cup(row) | {"t3_as_printed": third, "radius_95_um": _by_cup(around)}
+                for row, third, around in zip(norms, printed, radii, strict=True)
+            ],
             monte_carlo=[_by_cup(drawn) for drawn in self.drawn],
         )
 

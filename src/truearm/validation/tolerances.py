@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from truearm.engine.base.units import Marked
 from truearm.engine.command.arguments import lengths_argument, robot_argument
 from truearm.engine.document.document import Block, Table, each, say
 from truearm.engine.document.records import Record
+from truearm.engine.fit.problem import in_words
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.conversion import converted
+from truearm.engine.robot.parameters import FreeParameters
 from truearm.engine.robot.robot import Robot
 from truearm.validation.lines import CONVENTION, design
 
@@ -29,19 +32,16 @@ if TYPE_CHECKING:
 # cos(mu) cos(egamma) / l)`` (9 and 10, which print them for ``Ry Rx`` and without the sign; equation 5 has ``Rx Ry``).
 @dataclass(frozen=True)
 class Tolerance:
-    """What one joint's assembly uses of its tolerances."""
+    """What the leaning of one joint's axis uses of its tolerance."""
 
     delta: float  #: How far the axis is aside at the hole's depth: perpendicularity or parallelism [m].
     towards: float  #: To which side it leans, from x towards y of the joint's frame [rad].
-    position: tuple[float, float, float]  #: Of the joint's frame beside its place, x, y and z [m].
 
 
-def tolerance_of(
-    ebeta: float, egamma: float, depth: float, position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-) -> Tolerance:
-    """Return the tolerance that errors use: angles [rad], hole depth and position [m]."""
+def tolerance_of(ebeta: float, egamma: float, depth: float) -> Tolerance:
+    """Return the tolerance that errors use: angles [rad] and hole depth [m]."""
     right, up = math.tan(ebeta) / math.cos(egamma), -math.tan(egamma)
-    return Tolerance(checked_depth(depth) * math.hypot(right, up), math.atan2(up, right), position)
+    return Tolerance(checked_depth(depth) * math.hypot(right, up), math.atan2(up, right))
 
 
 def errors_of_tolerance(delta: float, towards: float, depth: float) -> tuple[float, float]:
@@ -58,18 +58,85 @@ def checked_depth(depth: float) -> float:
     return depth
 
 
-def joint_tolerances(robot: Robot, depths: Sequence[float]) -> tuple[Tolerance, ...]:
-    """Return what the joints of a robot with joint errors use of their tolerances; hole depths in m."""
-    values = robot.values
-    return tuple(
-        tolerance_of(
-            values[f"ebeta_{i}"],
-            values[f"egamma_{i}"],
-            depth,
-            (values[f"ex_{i}"], values[f"ey_{i}"], values[f"ez_{i}"]),
+@dataclass(frozen=True)
+class KnownError:
+    """A joint error, or a sum of errors that measurements could not tell apart, as a robot file knows it."""
+
+    words: str  #: What it is: ``ey_2 + ez_1``.
+    joints: tuple[int, ...]  #: Numbers of the joints whose errors are in it, from 1.
+    value: float | None  #: None where it is unknown [m or rad].
+    deviation: float | None  #: Standard deviation; None where none is stated [m or rad].
+
+    def within(self, half: float) -> tuple[float, float] | None:
+        """Return the ends that are so many deviations away [m or rad]; None where they are not known."""
+        if self.value is None or self.deviation is None:
+            return None
+        return self.value - half * self.deviation, self.value + half * self.deviation
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """It as JSON holds it, of a length."""
+        at = None if self.value is None else self.value * 1e3
+        return {
+            "is": self.words,
+            "joints": [*self.joints],
+            "mm": at,
+            "90_mm": _times(self.within(_NORMAL_90), 1e3),
+        }
+
+
+def known_errors(robot: Robot) -> dict[str, KnownError]:
+    """Return the joint errors of a robot by their parameters, each with those that are in its value as well.
+
+    Where some have deviations, those without were held in the identification. They are unknown, and what is identified
+    is a sum that contains them.
+
+    Raises:
+        InputError: If the robot is not described by joint errors, or has none.
+    """
+    design(robot)
+    errors = {name: p for name, p in robot.parameters.items() if p.group == "geometry"}
+    kinds = ("base", "joint zero", "geometry")
+    found = [name for name, p in robot.parameters.items() if p.deviation is not None and p.group in kinds]
+    if not found and not any(p.value for p in errors.values()):
+        raise InputError(
+            "the robot file has no joint errors: all of them are zero, and none has a deviation",
+            where=robot.name,
+            cure="Find them with 'truearm axes', which writes joint-errors.yaml.",
         )
-        for i, depth in enumerate(depths, 1)
-    )
+    held = [name for name, p in errors.items() if p.deviation is None] if found else []
+    sums = _sums(robot, found, held)
+    everything = FreeParameters(tuple(robot.parameters.values()))
+    known = {}
+    for name, p in errors.items():
+        members = {name: 1.0, **sums.get(name, {})}
+        value = sum(factor * errors[member].value for member, factor in members.items())
+        words = in_words(members, everything, summed=True)
+        joints = tuple(sorted({int(number) for number in re.findall(r"_(\d+)", words)}))
+        known[name] = KnownError(words, joints, None if name in held else value, p.deviation)
+    return known
+
+
+def _sums(robot: Robot, found: Sequence[str], held: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return which held errors are in the value of each identified parameter, with their factors [SI].
+
+    What a held error does to the flange, in every configuration, the identified ones do in its place; the base helps
+    where these alone cannot. One that nothing does in its place was not seen.
+    """
+    base = [name for name, p in robot.parameters.items() if p.group == "base"]
+    q = robot.random_configurations(_FOR_SUMS, np.random.default_rng(0))
+    linear, angular = robot.jacobians(robot.forward_kinematics(q), q, [*found, *base, *held])
+    columns = np.concatenate([linear, angular], axis=1).reshape(len(linear), -1).T
+    sums: dict[str, dict[str, float]] = {}
+    for name, moved in zip(held, columns.T[len(found) + len(base) :], strict=True):
+        for others in (columns[:, : len(found)], columns[:, : len(found) + len(base)]):
+            factors = np.linalg.lstsq(others, moved, rcond=None)[0]
+            if np.linalg.norm(others @ factors - moved) < _IN_ITS_PLACE * np.linalg.norm(moved):
+                for other, factor in zip(found, factors.tolist(), strict=False):
+                    if abs(factor) > _IN_ITS_PLACE:
+                        sums.setdefault(other, {})[name] = factor
+                break
+    return sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,41 +176,107 @@ def flange_error(robot: Robot, leans: Sequence[float], positions: Sequence[float
     )
 
 
+@dataclass(frozen=True)
+class UsedLean:
+    """What the leaning of one joint's axis uses of its tolerance, as far as its two angles are known."""
+
+    depth: float  #: Of the joint's hole [m].
+    angles: tuple[KnownError, KnownError]  #: ebeta and egamma.
+
+    @property
+    def used(self) -> Tolerance | None:
+        """The tolerance used; None where an angle is unknown."""
+        ebeta, egamma = (angle.value for angle in self.angles)
+        return None if ebeta is None or egamma is None else tolerance_of(ebeta, egamma, self.depth)
+
+    @property
+    def intervals(self) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+        """Where delta [m] and its side [rad] lie with 90 % or more; None where that is not known, or any side may be.
+
+        Both angles lie within their intervals of 95 % in 90 % of the cases or more, however they are correlated
+        (Bonferroni).
+        """
+        ebeta, egamma = (angle.within(_NORMAL_95) for angle in self.angles)
+        if self.used is None or ebeta is None or egamma is None:
+            return None, None
+        (b, b2), (g, g2) = ebeta, egamma
+        least = tolerance_of(max(b, -b2, 0.0), max(g, -g2, 0.0), self.depth).delta
+        largest = tolerance_of(max(-b, b2), max(-g, g2), self.depth).delta
+        if least == 0.0:
+            return (0.0, largest), None
+        middle = self.used.towards
+        corners = [tolerance_of(x, y, self.depth).towards for x in ebeta for y in egamma]
+        turned = [math.remainder(corner - middle, math.tau) for corner in corners]
+        return (least, largest), (middle + min(turned), middle + max(turned))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """It as JSON holds it."""
+        used, (delta, side) = self.used, self.intervals
+        return {
+            "is": ", ".join(angle.words for angle in self.angles),
+            "joints": sorted({joint for angle in self.angles for joint in angle.joints}),
+            "depth_mm": self.depth * 1e3,
+            "lean_mm": None if used is None else used.delta * 1e3,
+            "lean_90_mm": _times(delta, 1e3),
+            "towards_deg": None if used is None else math.degrees(used.towards),
+            "towards_90_deg": _times(side, math.degrees(1.0)),
+        }
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class UsedTolerances(Record):
     """What the errors of a robot's joints use of their tolerances."""
 
+    is_list: ClassVar = True
     robot: str  #: Its name.
-    depths: tuple[float, ...]  #: Of the joints' holes [m].
-    joints: tuple[Tolerance, ...]  #: What each joint uses.
+    leans: tuple[UsedLean, ...]  #: Of the axis of each joint.
+    places: tuple[KnownError, ...]  #: ex, ey and ez of each joint [m].
     simulated_from: tuple[Marked, ...] = ()  #: What of it comes from a virtual instrument.
 
     def blocks(self) -> Iterator[Block]:
-        """Give what each joint uses, in mm and deg."""
+        """Give how far each axis leans, and where each joint is beside its place, in mm and deg."""
         yield say(robot=self.robot)
-        heading = ("joint", "depth [mm]", "lean [mm]", "towards [deg]", "position x, y, z [mm]")
-        entries: list[dict[str, Any]] = [
-            {
-                "joint": number,
-                "depth_mm": depth * 1e3,
-                "lean_mm": used.delta * 1e3,
-                "towards_deg": math.degrees(used.towards),
-                "position_mm": [v * 1e3 for v in used.position],
-            }
-            for number, (depth, used) in enumerate(zip(self.depths, self.joints, strict=True), 1)
-        ]
-        rows = [
+        leans, places = [lean.summary for lean in self.leans], [place.summary for place in self.places]
+        heading = ("lean", "joints", "depth [mm]", "[mm]", "90 %", "towards [deg]", "90 %")
+        shown = [
             (
-                str(row["joint"]),
-                *(
-                    f"{row[key]:{form}}"
-                    for key, form in (("depth_mm", ".1f"), ("lean_mm", ".4f"), ("towards_deg", ".1f"))
-                ),
-                ", ".join(f"{v:.4f}" for v in row["position_mm"]),
+                *_named(row),
+                f"{row['depth_mm']:.1f}",
+                *_shown(row["lean_mm"], row["lean_90_mm"], ".4f"),
+                *_shown(row["towards_deg"], row["towards_90_deg"], ".1f", "any" if row["lean_90_mm"] else _NOT_KNOWN),
             )
-            for row in entries
+            for row in leans
         ]
-        yield Table(heading, rows, in_json={"joints": entries})
+        yield Table(heading, shown, in_json={"leans": leans})
+        rows = [(*_named(row), *_shown(row["mm"], row["90_mm"], ".4f")) for row in places]
+        yield Table(("position", "joints", "[mm]", "90 %"), rows, in_json={"positions": places})
+        known = [*self.places, *(angle for lean in self.leans for angle in lean.angles)]
+        for is_so, words in (
+            (any(" " in e.words for e in known), "Of a sum it is not known which of its errors has how much of it."),
+            (any(e.value is None for e in known), "Unknown: measurements did not see it, or only in a sum."),
+            (all(e.deviation is None for e in known), "The robot file states no deviations: intervals are not known."),
+        ):
+            yield say(words if is_so else "")
+
+
+#: What is printed for an interval where no deviation is stated.
+_NOT_KNOWN: Final = "not known"
+
+
+def _times(ends: tuple[float, float] | None, scale: float) -> list[float] | None:
+    return None if ends is None else [end * scale for end in ends]
+
+
+def _named(row: dict[str, Any]) -> tuple[str, str]:
+    return row["is"], ", ".join(map(str, row["joints"]))
+
+
+def _shown(value: float | None, ends: list[float] | None, form: str, without: str = _NOT_KNOWN) -> tuple[str, str]:
+    """Return a figure and its interval as cells."""
+    if value is None:
+        return "unknown", ""
+    return f"{value:{form}}", without if ends is None else f"{ends[0]:{form}} to {ends[1]:{form}}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,6 +320,13 @@ class AllowedErrors(Record):
 
 #: Configurations at which the flange is looked at, drawn from the robot's limits.
 _CONFIGURATIONS: Final = 2000
+#: The same where errors are looked for that do what others do, which must do so in all of them.
+_FOR_SUMS: Final = 40
+#: By less than this share two motions of the flange are the same.
+_IN_ITS_PLACE: Final = 1e-6
+#: Deviations to both sides that hold a normal value in 90 and in 95 of 100 cases.
+_NORMAL_90: Final = 1.644854
+_NORMAL_95: Final = 1.959964
 
 
 def judged(asked: JudgeTolerance) -> UsedTolerances | AllowedErrors:
@@ -196,8 +336,13 @@ def judged(asked: JudgeTolerance) -> UsedTolerances | AllowedErrors:
     depths = tuple(checked_depth(d) for d in lengths_argument(asked.depth, "depth", count, one_for_all=True))
     if asked.lean is None and asked.position is None:
         with refusals_of("robot"):
-            design(robot)  # refuses robots without joint errors
-        return UsedTolerances(robot.name, depths, joint_tolerances(robot, depths), robot.simulated_from)
+            known = known_errors(robot)
+        return UsedTolerances(
+            robot.name,
+            tuple(UsedLean(d, (known[f"ebeta_{i}"], known[f"egamma_{i}"])) for i, d in enumerate(depths, 1)),
+            tuple(known[f"{slide}_{i}"] for i in range(1, count + 1) for slide in ("ex", "ey", "ez")),
+            robot.simulated_from,
+        )
     leans = lengths_argument(0.0 if asked.lean is None else asked.lean, "lean", count, 0.0, one_for_all=True)
     positions = lengths_argument(
         0.0 if asked.position is None else asked.position, "position", count, 0.0, one_for_all=True

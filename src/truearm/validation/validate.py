@@ -34,6 +34,7 @@ from truearm.engine.command.arguments import (
 from truearm.engine.command.split import TRAINING_DATA, changed_since, training_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, Spread, errors_of
+from truearm.engine.data.thinning import check_duplicates
 from truearm.engine.diagnose.expected_error import error_by_order
 from truearm.engine.diagnose.external_force import check_force, check_payload
 from truearm.engine.diagnose.least_error import Kind, LeastError, least_errors
@@ -219,6 +220,7 @@ def validated(asked: Validate) -> Validation:
     warnings = (
         *read.notices,
         *judged.mistaken,
+        *check_duplicates(read.data),
         *read.other_session,
         *check_payload(read.robot),
         *check_force([(read.robot, read.data.postures)]),

@@ -42,6 +42,10 @@ _BEYOND_DECLARED: Final = 1.02
 _FEWEST_POSTURES: Final = 5
 
 
+#: Visits that differ by less [m or rad] are copies, or rounding hides by how much they do.
+_NOTHING: Final = 1e-12
+
+
 @dataclass(frozen=True)
 class LeastError:
     """The mean error that exact parameters would leave."""
@@ -97,6 +101,8 @@ def _of_visits(errors: Errors, data: Dataset, kind: Kind, declared: float | None
     if again is None or vectors is None or again.postures < _FEWEST_POSTURES:
         return None
     lengths = np.linalg.norm(again.apart(vectors), axis=1) / np.sqrt(1.0 - 1.0 / again.count)
+    if np.median(lengths) < _NOTHING:
+        return None
     return LeastError(float(lengths.mean()), "visits", declared, again.visits, again.postures)
 
 

@@ -547,11 +547,19 @@ def _redundancy(free: FreeParameters, dropped: int, combination: Array, away: Ar
     return Redundancy(free.names[dropped], members, in_words(members, free))
 
 
-def in_words(members: dict[str, float], free: FreeParameters) -> str:
-    """Name the members that matter, a millimetre weighed against a tenth of a degree."""
+def in_words(members: dict[str, float], free: FreeParameters, *, summed: bool = False) -> str:
+    """Name the members that matter, a millimetre weighed against a tenth of a degree.
+
+    Args:
+        members: By how much each parameter moves in a direction [SI].
+        free: All of them, with their units.
+        summed: Whether they are the factors of a sum instead, in units of the first one.
+    """
     by_name: dict[str, Parameter] = dict(zip(free.names, free.parameters, strict=True))
-    size = {n: abs(c) / (1e-3 if by_name[n].unit == "m" else 1.75e-3) for n, c in members.items()}
+    usual = {n: (1e-3 if by_name[n].unit == "m" else 1.75e-3) ** (1 if summed else -1) for n in members}
+    size = {n: abs(c) * usual[n] for n, c in members.items()}
     largest = max(size.values())
+    first = by_name[next(iter(members))].unit
     words = ""
     for name, coefficient in members.items():
         if size[name] < _SHOWN * largest:
@@ -560,12 +568,9 @@ def in_words(members: dict[str, float], free: FreeParameters) -> str:
         if abs(factor - 1) < 0.02:
             text = name
         else:
-            mixed = by_name[name].unit != by_name[next(iter(members))].unit
-            units = {("m", "rad"): " mm/rad", ("rad", "m"): " rad/mm"}.get(
-                (by_name[name].unit, by_name[next(iter(members))].unit), ""
-            )
-            scale = {" mm/rad": 1e3, " rad/mm": 1e-3}.get(units, 1.0)
-            text = f"{factor * scale:.3g}{units if mixed else ''}·{name}"
+            mixed = (first, by_name[name].unit) if summed else (by_name[name].unit, first)
+            units, scale = {("m", "rad"): (" mm/rad", 1e3), ("rad", "m"): (" rad/mm", 1e-3)}.get(mixed, ("", 1.0))
+            text = f"{factor * scale:.3g}{units}·{name}"
         sign = "-" if coefficient < 0 else "+"
         words += f" {sign} {text}" if words else text
     return words

@@ -32,13 +32,13 @@ from truearm.iso9283.evaluating.table import (
     UNITS,
     conditions_summary,
     copied_notices,
-    counted_criteria,
     cube_notices,
     cycle_notices,
     row_notices,
+    uncovered_tests,
     worst_places,
 )
-from truearm.iso9283.planning.criteria import PerformancePlan
+from truearm.iso9283.planning.criteria import TEST_OF, TESTS, PerformancePlan
 from truearm.iso9283.planning.plan_file import read_plan
 
 if TYPE_CHECKING:
@@ -73,9 +73,9 @@ class Iso9283Evaluation(Record):
         """Give each criterion at its worst place, at the fastest velocity and at others; the rest is in the files."""
         tie, sigma_rot = self.evaluation.alignment, self.instrument.sigma_rot
         measured = [value for value in self.values if value.status != "not-measured"]
-        criteria = {value.id for value in measured}
+        tests = {TEST_OF[value.id] for value in measured}
         yield say(
-            f"{self.plan.robot.title}: {counted(len(measured), 'value')} of {counted_criteria(len(criteria))}.",
+            f"{self.plan.robot.title}: {counted(len(measured), 'value')} from {len(tests)} of {len(TESTS)} tests.",
             truearm=SCHEMA,
             robot=self.plan.robot.name,
             inputs={name: file.model_dump() for name, file in self.read.items()},
@@ -104,9 +104,8 @@ class Iso9283Evaluation(Record):
             yield tell(words, *lines)
             yield detail(f"All places, axes and angles are in the report and in {RESULT}.")
         yield say(criteria=[value_summary(value) for value in self.values], **self._drawn())
-        absent = dict.fromkeys(value.id for value in self.values if value.id not in criteria)
-        if absent:
-            yield say(f"Not measured: {', '.join(absent)}.")
+        absent = uncovered_tests(self.values)
+        yield say(f"Not measured: {'; '.join(absent)}." if absent else "", not_measured=[*absent])
         if self.comparison is not None:
             yield under("comparison", self.comparison.blocks())
 

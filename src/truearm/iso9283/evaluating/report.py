@@ -41,9 +41,9 @@ from truearm.iso9283.evaluating.table import (
     conditions_words,
     number_words,
     test_name,
+    uncovered_tests,
     worst_places,
 )
-from truearm.iso9283.planning.criteria import TESTS
 
 if TYPE_CHECKING:
     from truearm.iso9283.criteria.rows import Component, Value
@@ -259,7 +259,6 @@ _ANGLES: tuple[Component, ...] = ("a", "b", "c")
 
 def iso9283_report(result: Iso9283Evaluation) -> str:
     """Return the report: the criteria at their worst places, pictures, and every value."""
-    measured = [value for value in result.values if value.status != "not-measured"]
     worst = tuple(tuple(map(_unbroken, place.cells)) for place in worst_places(result.values))
     tables = [tabled("Criteria at their worst places", HEADING, worst, texts=(1, 4, 5))]
     if result.comparison is not None:
@@ -269,18 +268,18 @@ def iso9283_report(result: Iso9283Evaluation) -> str:
         details += _tables(name, [value for value in result.values if test_name(value) == name])
     evaluation = result.evaluation
     plan = result.plan
-    unread = [test for test in plan.tests if not any(value.id in TESTS[test.id].criteria for value in measured)]
+    absent = uncovered_tests(result.values)
     words = [
         result.tied,
         f"Rated: {plan.rated_load:g} kg, {plan.rated_velocity * 1e3:g} mm/s along a path. A reading of the instrument "
         f"has a standard deviation of {result.instrument.sigma * 1e3:g} mm.",
-        "Intervals are of 95 %. Criteria of three cycles have their range instead. Of several velocities the fastest "
-        "is in the first table and in the pictures.",
+        "Intervals are of 95 %. Criteria of three cycles are the mean of these, or the largest, and have their range "
+        "instead. Of several velocities the fastest is in the first table and in the pictures.",
         "Evaluated by what the literature says of ISO 9283:1998. Who wants to claim conformity needs the standard's "
         "own text.",
     ]
-    if unread:
-        words.append(f"Planned and not measured: {', '.join(TESTS[test.id].name for test in unread)}.")
+    if absent:
+        words.append(f"Not measured: {'; '.join(absent)}.")
     return Document(
         f"{plan.robot.title} by the criteria of ISO 9283",
         [

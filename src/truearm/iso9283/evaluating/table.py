@@ -26,6 +26,11 @@ UNITS: Final[Mapping[Quantity, tuple[str, float]]] = {
     "compliance": ("mm/N", 1e3),
 }
 _DECIMALS: Final[Mapping[Quantity, int]] = {"length": 4, "angle": 4, "time": 3, "ratio": 3, "speed": 2, "compliance": 6}
+#: What a criterion is of its cycles, where that is their mean or their largest; AP, for one, is neither.
+_OF_CYCLES: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("t", "posing-time", "CR", "CO", "WS", "WF", "compliance"), "mean of "),
+    **dict.fromkeys(("OV", "FV"), "largest of "),
+}
 #: Columns of :attr:`Worst.cells`.
 HEADING: Final = ("Criterion", "Worst place", "Value", "95 %, or range", "Other velocities", "Status")
 #: Where the value is the worst of several places already.
@@ -113,7 +118,7 @@ def beside_words(value: Value) -> str:
         return f"{low} to {high}"
     if value.least is not None and value.largest is not None:
         low, high = (_number(end, value.quantity) for end in (value.least, value.largest))
-        return f"{low} to {high} in {counted(value.cycles, 'cycle')}"
+        return f"{_OF_CYCLES.get(value.id, '')}{counted(value.cycles, 'cycle')}, {low} to {high}"
     return ""
 
 
@@ -186,9 +191,15 @@ def test_name(value: Value) -> str:
     return TESTS[TEST_OF[value.id]].name
 
 
-def counted_criteria(count: int) -> str:
-    """Return how many criteria, in words."""
-    return f"{count} criteri{'on' if count == 1 else 'a'}"
+def uncovered_tests(values: Sequence[Value]) -> tuple[str, ...]:
+    """Return what of the standard's tests the data do not cover, in words: whole tests by name, else criteria."""
+    covered = {value.id for value in values if value.status != "not-measured"}
+    missing = {test: [name for name in test.criteria if name not in covered] for test in TESTS.values()}
+    return tuple(
+        f"{test.name} ({', '.join(names)})" if len(names) == len(test.criteria) else ", ".join(names)
+        for test, names in missing.items()
+        if names
+    )
 
 
 def _number(number: float, quantity: Quantity) -> str:

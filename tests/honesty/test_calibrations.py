@@ -183,6 +183,56 @@ def test_the_error_of_the_joints_is_one_of_a_kind_of_joint(tmp_path: Path) -> No
     assert of_all["deviation"] == pytest.approx(0.02, abs=0.004)
 
 
+# -- calibrated again ------------------------------------------------------------------------------------------
+
+
+@cache
+def after_a_repair(folder: Path) -> tuple[Twin, Path, Path]:
+    """Return a robot whose third joint's zero was moved after its calibration, that calibration, and five readings."""
+    twin, data = campaign("irb120", 70, 3e-5, 102)
+    told("calibrate", "irb120", written(folder, data, "before.csv"), "--model=geometric", "--out", folder / "before")
+    moved = twin.robot.values["theta_offset_3"] + np.radians(0.3)
+    repaired = replace(twin, robot=twin.robot.with_values({"theta_offset_3": moved}))
+    few = written(folder, more_of(repaired, 5, 3e-5, 502), "five.csv")
+    return repaired, folder / "before" / "calibrated.yaml", few
+
+
+@pytest.mark.parametrize("model", [(), ("--model=offsets",)], ids=["default", "offsets"])
+def test_five_configurations_after_a_repair(model: tuple[str, ...], folder: Path) -> None:
+    """What was known and was not asked anew is known as well as before: the geometry is not what its priors say."""
+    twin, calibration, few = after_a_repair(folder)
+    found = told("calibrate", calibration, few, *model, "--out", folder / f"repaired{len(model)}")
+    assert (found.code, [*found.levels]) == (0, ["few-held-out"]), found
+    assert found.summary["nominal"]["position_mm"]["mean"] > 2.0
+    position = errors_of(
+        truearm.load_robot(folder / f"repaired{len(model)}" / "calibrated.yaml"), more_of(twin, 300, 0.0, 9)
+    ).position
+    assert position is not None
+    low, high = found.summary["expected_mm"]["interval_90"]
+    assert low < 1e3 * position.mean < high < 0.2
+
+
+def test_five_configurations_of_a_robot_of_which_nothing_is_known(folder: Path) -> None:
+    """Without the proof of the calibration before, the geometry is as uncertain as its priors."""
+    _, calibration, few = after_a_repair(folder)
+    text = calibration.read_text()
+    head, tail = text.split("proof:\n")
+    unproven = folder / "unproven.yaml"
+    unproven.write_text(head + tail[tail.index("history:") :])
+    found = told("calibrate", unproven, few, "--model=offsets", "--out", folder / "unproven")
+    assert found.summary["expected_mm"]["lower_bound"]
+    assert found.summary["expected_mm"]["interval_90"][1] is None
+
+
+def test_geometry_found_anew_is_not_as_well_known_as_before(folder: Path) -> None:
+    _, calibration, few = after_a_repair(folder)
+    found = told("calibrate", calibration, few, "--model=geometric", "--out", folder / "anew")
+    assert found.says("rank-loss", "error", "earlier calibration knew the geometry.*model=offsets"), found
+    nominal = told("calibrate", "irb120", few, "--model=geometric", "--out", folder / "first")
+    assert nominal.says("rank-loss", "error")
+    assert "earlier calibration" not in nominal.messages["rank-loss"]
+
+
 # -- validation ------------------------------------------------------------------------------------------------
 
 

@@ -72,9 +72,7 @@ from truearm.engine.fit.rounds import Redundant
 from truearm.engine.fit.solver import watching
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import urdf_source
-from truearm.engine.robot.proof import Proof
 from truearm.engine.robot.robot import Robot
-from truearm.engine.robot.robot_file.seal import is_intact
 
 if TYPE_CHECKING:
     from truearm.calibration.calibrate import Calibrate
@@ -443,7 +441,6 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
         urdf=read.urdf,
         shares=solved.shares,
         because=parts.because,
-        known_before=_known_before(solved.robot),
         without=tuple(asked.without),
         excluded=parts.excluded,
         notes=dict(asked.notes or {}),
@@ -487,10 +484,3 @@ def _beside_nominal(
     doubted = fit.loss in PULLED and any(notice.code in DOUBTED for notice in noticed)
     nominal = place(fit.start, training, "cauchy", fixed) if doubted else placed
     return check_gain(errors_of(nominal, held_out), errors_of(fit.robot, held_out), held_out, doubted=doubted)
-
-
-def _known_before(robot: Robot) -> Proof | None:
-    """Return what is known of a robot already; of one whose values were changed since, only what speaks against it."""
-    if robot.proof is None or is_intact(robot):
-        return robot.proof
-    return replace(robot.proof, names=(), deviations=(), factor=())

@@ -23,6 +23,7 @@ from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
 
@@ -181,6 +182,24 @@ def test_the_error_of_the_joints_is_one_of_a_kind_of_joint(tmp_path: Path) -> No
     (of_all,) = json.loads((tmp_path / "out" / "result.json").read_text())["noise"]["joint_error"]
     assert (of_all["kind"], of_all["joints"], of_all["unit"]) == ("revolute", [1, 2, 3, 4, 5, 6], "deg")
     assert of_all["deviation"] == pytest.approx(0.02, abs=0.004)
+
+
+# -- plans -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("model", "holds"), [("elastic", True), ("geometric", False)])
+def test_what_a_plan_predicts_where_loads_are_known(model: str, holds: bool, folder: Path) -> None:
+    """The joints of the truth give way: the geometric model cannot follow, and the plan for it says so."""
+    load, rng = Payload(2.7, (0.05, 0.025, 0.1)), np.random.default_rng(0)
+    robot = load_robot("irb120").with_payload(load)
+    planned = truearm.plan(robot, poses=30, candidates=200, model=model)
+    twin = truth_twin(robot, "tracker-triangular", rng)
+    fit = identify(robot, measure(twin, planned.joints, planned.noise, rng), named_model(model))
+    position = errors_of(fit.robot, more_of(twin, 100, planned.noise, 2)).position
+    assert position is not None
+    assert (0.8 < position.mean / planned.made.prediction.planned < 1.25) is holds
+    assert planned.summary()["prediction"]["loads_left_out"] is not holds
+    assert (f"the {model} model does not follow how far joints give way" in planned.answer[-1]) is not holds
 
 
 # -- calibrated again ------------------------------------------------------------------------------------------

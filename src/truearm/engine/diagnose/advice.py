@@ -74,8 +74,8 @@ def check_fit(fit: Fit, expected: ExpectedError) -> list[Notice]:
         if fit.found_anew:
             words += (
                 " An earlier calibration knew the geometry. This one finds it anew, and takes it for as uncertain as "
-                "its priors. If the joint zeros alone have changed, the robot is better than the expected error says: "
-                "`model=offsets` then finds these, and leaves the geometry as well known as it was."
+                "its priors. The expected error holds if it has changed by about so much. If only the joint zeros have "
+                "changed, `model=offsets` finds them, and leaves the geometry as well known as it was."
             )
         sound = fit.status is not Status.RANK_LOSS
         notices.append(

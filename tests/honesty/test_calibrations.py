@@ -184,6 +184,43 @@ def test_the_error_of_the_joints_is_one_of_a_kind_of_joint(tmp_path: Path) -> No
     assert of_all["deviation"] == pytest.approx(0.02, abs=0.004)
 
 
+# -- postures visited again ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("truth", "seed"), [("gear-errors", 0), ("gear-errors", 3), ("random", 1)], ids=["gears-0", "gears-3", "perfect"]
+)
+def test_postures_visited_again_say_little_of_others(truth: str, seed: int, folder: Path) -> None:
+    """Errors of the gears are the same on every visit: three visits of ten postures are no thirty configurations."""
+    rng, robot = np.random.default_rng(seed), load_robot("irb120")
+    twin = truth_twin(robot, truth, rng)
+    of = rng.permutation(np.repeat(np.arange(14), 3))
+    joints = robot.random_configurations(14, rng)[of]
+    data = measure(twin, joints + np.radians(rng.normal(0.0, 0.001, joints.shape)), 3e-5, rng)
+    found = told("calibrate", "irb120", written(folder, data), "--model=geometric", "--out", folder / "again")
+    position = errors_of(truearm.load_robot(folder / "again" / "calibrated.yaml"), more_of(twin, 200, 0.0, 9)).position
+    assert position is not None
+    low, high = found.summary["expected_mm"]["interval_90"]
+    assert low < 1e3 * position.mean < (high or 2.0 * found.summary["expected_mm"]["mean"])
+    assert found.summary["validation"]["position_mm"]["mean"] > 0.8e3 * position.mean
+
+
+def test_copied_readings_count_once(folder: Path) -> None:
+    """With fewer digits, so that nothing tells that they are copies."""
+    twin, data = made(None)
+    some = data.of_configurations(np.arange(16))
+    copied = Dataset.of(
+        np.concatenate([some.joints] * 3),
+        np.concatenate([some.position, some.position.round(6), some.position.round(7)]).reshape(-1, 3, 3),
+        sigma=NOISE,
+    )
+    found = told("calibrate", "irb120", written(folder, copied), "--model=geometric", "--out", folder / "copied")
+    position = errors_of(truearm.load_robot(folder / "copied" / "calibrated.yaml"), more_of(twin, 200, 0.0, 9)).position
+    assert position is not None
+    low, high = found.summary["expected_mm"]["interval_90"]
+    assert low < 1e3 * position.mean < high
+
+
 # -- plans -----------------------------------------------------------------------------------------------------
 
 

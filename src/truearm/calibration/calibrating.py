@@ -28,7 +28,6 @@ from truearm.engine.command.arguments import (
 )
 from truearm.engine.command.reading import Excluded, check_excluded, count_excluded, in_parts, without_excluded
 from truearm.engine.command.split import (
-    check_copies,
     check_split,
     check_trained_before,
     left_out,
@@ -37,6 +36,7 @@ from truearm.engine.command.split import (
     without_words,
 )
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.parting import parted
 from truearm.engine.data.statistics import errors_of, without_table_motion
 from truearm.engine.data.thinning import readings_digest
 from truearm.engine.diagnose.base_changes import checked_parts, with_one_base
@@ -296,8 +296,7 @@ def _split(asked: Calibrate, read: _Read) -> _Parts:
     """Check the data, and part them into what is trained on and what judges."""
     readings = read.readings
     count = train_count(asked.train, readings.configurations, readings.source)
-    order = np.random.default_rng(asked.seed).permutation(readings.configurations)
-    training, held_out = order[:count], order[count:]
+    training, held_out = parted(readings.joints, readings.joint_kinds, count, asked.seed)
     model, because = _model(asked, read.robot, readings.of_configurations(training))
     excluded = in_parts(read.excluded, readings, held_out)
     if not readings.has_reading.any():
@@ -384,7 +383,6 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
             parts.held_out,
             validation,
         ),
-        *check_copies(parts.readings, parts.training, parts.held_out),
         *check_trained_before(
             solved.robot,
             read.as_read,

@@ -431,7 +431,7 @@ def _worth(
     else:
         covariance, parts = cluster_covariance(
             lambda: _pulled(problem, solution, loss),
-            Visits(problem.visits),
+            Visits(problem.standings),
             ~at_bound,
             _beforehand(problem, limits, open_),
         )
@@ -452,7 +452,7 @@ def _worth(
         alone = parts[0] if scattered or draws is not None else None
         erring = joints > 0.0 if components is None else components.likeliest.joints > 0.0
         unfitted, parts, told = parts_with_sizes(
-            at_solution, solved.sizes, joints, erring, solution.weight, at_bound, alone
+            at_solution, solved.sizes, joints, erring, solution.weight / problem.times_visited, at_bound, alone
         )
         covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
         informed = np.clip(told[: len(x)], 0.0, 1.0)

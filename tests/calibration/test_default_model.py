@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.commanding import Truearm
+from tests.expecting import known
 from tests.simulated import campaign
 
 import truearm
 from truearm.calibration.calibrate import ENOUGH, Calibrate
 from truearm.engine.data.readers.canonical import csv_text
 from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.robot_file.seal import sealed
 
 
 @pytest.mark.parametrize(
@@ -74,3 +76,21 @@ def test_lengths_are_too_few_numbers_for_every_effect() -> None:
     for readings in (lengths, replace(data, fixture=np.zeros(len(data.target), dtype=np.int64), fixtures=("plate",))):
         model, because = Calibrate("ur5", data).model_for(twin.robot, readings)
         assert (model, because) == ("geometric", "readings are lengths or of fixtures")
+
+
+def test_few_configurations_of_a_calibrated_robot_are_for_its_zeros() -> None:
+    _, data = campaign("kr5", 30, 2e-5, 3)
+    calibrated = truearm.calibrate("kr5", data, model="geometric").robot
+    proof = known(calibrated.proof)
+    few = data.of_configurations(range(ENOUGH - 1))
+    unsound = sealed(calibrated, replace(proof, status="rank-loss"))
+    edited = calibrated.with_values({"x_3": calibrated.values["x_3"] + 1e-3})
+    for robot, readings, model in (
+        (calibrated, few, "offsets"),
+        (calibrated, data, "auto"),
+        (unsound, few, "geometric"),
+        (edited, few, "geometric"),
+    ):
+        name, because = Calibrate(robot, readings).model_for(robot, readings)
+        assert name == model
+        assert ("calibrated before, and 14 configurations are few" in because) is (model == "offsets")

@@ -23,6 +23,7 @@ from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
+from truearm.engine.robot.parts import Payload
 from truearm.engine.twin.truths import truth_twin
 from truearm.engine.twin.twin import Twin, measure
 
@@ -181,6 +182,111 @@ def test_the_error_of_the_joints_is_one_of_a_kind_of_joint(tmp_path: Path) -> No
     (of_all,) = json.loads((tmp_path / "out" / "result.json").read_text())["noise"]["joint_error"]
     assert (of_all["kind"], of_all["joints"], of_all["unit"]) == ("revolute", [1, 2, 3, 4, 5, 6], "deg")
     assert of_all["deviation"] == pytest.approx(0.02, abs=0.004)
+
+
+# -- postures visited again ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("truth", "seed"), [("gear-errors", 0), ("gear-errors", 3), ("random", 1)], ids=["gears-0", "gears-3", "perfect"]
+)
+def test_postures_visited_again_say_little_of_others(truth: str, seed: int, folder: Path) -> None:
+    """Errors of the gears are the same on every visit: three visits of ten postures are no thirty configurations."""
+    rng, robot = np.random.default_rng(seed), load_robot("irb120")
+    twin = truth_twin(robot, truth, rng)
+    of = rng.permutation(np.repeat(np.arange(14), 3))
+    joints = robot.random_configurations(14, rng)[of]
+    data = measure(twin, joints + np.radians(rng.normal(0.0, 0.001, joints.shape)), 3e-5, rng)
+    found = told("calibrate", "irb120", written(folder, data), "--model=geometric", "--out", folder / "again")
+    position = errors_of(truearm.load_robot(folder / "again" / "calibrated.yaml"), more_of(twin, 200, 0.0, 9)).position
+    assert position is not None
+    low, high = found.summary["expected_mm"]["interval_90"]
+    assert low < 1e3 * position.mean < (high or 2.0 * found.summary["expected_mm"]["mean"])
+    assert found.summary["validation"]["position_mm"]["mean"] > 0.8e3 * position.mean
+
+
+def test_copied_readings_count_once(folder: Path) -> None:
+    """With fewer digits, so that nothing tells that they are copies."""
+    twin, data = made(None)
+    some = data.of_configurations(np.arange(16))
+    copied = Dataset.of(
+        np.concatenate([some.joints] * 3),
+        np.concatenate([some.position, some.position.round(6), some.position.round(7)]).reshape(-1, 3, 3),
+        sigma=NOISE,
+    )
+    found = told("calibrate", "irb120", written(folder, copied), "--model=geometric", "--out", folder / "copied")
+    position = errors_of(truearm.load_robot(folder / "copied" / "calibrated.yaml"), more_of(twin, 200, 0.0, 9)).position
+    assert position is not None
+    low, high = found.summary["expected_mm"]["interval_90"]
+    assert low < 1e3 * position.mean < high
+
+
+# -- plans -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("model", "holds"), [("elastic", True), ("geometric", False)])
+def test_what_a_plan_predicts_where_loads_are_known(model: str, holds: bool, folder: Path) -> None:
+    """The joints of the truth give way: the geometric model cannot follow, and the plan for it says so."""
+    load, rng = Payload(2.7, (0.05, 0.025, 0.1)), np.random.default_rng(0)
+    robot = load_robot("irb120").with_payload(load)
+    planned = truearm.plan(robot, poses=30, candidates=200, model=model)
+    twin = truth_twin(robot, "tracker-triangular", rng)
+    fit = identify(robot, measure(twin, planned.joints, planned.noise, rng), named_model(model))
+    position = errors_of(fit.robot, more_of(twin, 100, planned.noise, 2)).position
+    assert position is not None
+    assert (0.8 < position.mean / planned.made.prediction.planned < 1.25) is holds
+    assert planned.summary()["prediction"]["loads_left_out"] is not holds
+    assert (f"the {model} model does not follow how far joints give way" in planned.answer[-1]) is not holds
+
+
+# -- calibrated again ------------------------------------------------------------------------------------------
+
+
+@cache
+def after_a_repair(folder: Path) -> tuple[Twin, Path, Path]:
+    """Return a robot whose third joint's zero was moved after its calibration, that calibration, and five readings."""
+    twin, data = campaign("irb120", 70, 3e-5, 102)
+    told("calibrate", "irb120", written(folder, data, "before.csv"), "--model=geometric", "--out", folder / "before")
+    moved = twin.robot.values["theta_offset_3"] + np.radians(0.3)
+    repaired = replace(twin, robot=twin.robot.with_values({"theta_offset_3": moved}))
+    few = written(folder, more_of(repaired, 5, 3e-5, 502), "five.csv")
+    return repaired, folder / "before" / "calibrated.yaml", few
+
+
+@pytest.mark.parametrize("model", [(), ("--model=offsets",)], ids=["default", "offsets"])
+def test_five_configurations_after_a_repair(model: tuple[str, ...], folder: Path) -> None:
+    """What was known and was not asked anew is known as well as before: the geometry is not what its priors say."""
+    twin, calibration, few = after_a_repair(folder)
+    found = told("calibrate", calibration, few, *model, "--out", folder / f"repaired{len(model)}")
+    assert (found.code, [*found.levels]) == (0, ["few-held-out"]), found
+    assert found.summary["nominal"]["position_mm"]["mean"] > 2.0
+    position = errors_of(
+        truearm.load_robot(folder / f"repaired{len(model)}" / "calibrated.yaml"), more_of(twin, 300, 0.0, 9)
+    ).position
+    assert position is not None
+    low, high = found.summary["expected_mm"]["interval_90"]
+    assert low < 1e3 * position.mean < high < 0.2
+
+
+def test_five_configurations_of_a_robot_of_which_nothing_is_known(folder: Path) -> None:
+    """Without the proof of the calibration before, the geometry is as uncertain as its priors."""
+    _, calibration, few = after_a_repair(folder)
+    text = calibration.read_text()
+    head, tail = text.split("proof:\n")
+    unproven = folder / "unproven.yaml"
+    unproven.write_text(head + tail[tail.index("history:") :])
+    found = told("calibrate", unproven, few, "--model=offsets", "--out", folder / "unproven")
+    assert found.summary["expected_mm"]["lower_bound"]
+    assert found.summary["expected_mm"]["interval_90"][1] is None
+
+
+def test_geometry_found_anew_is_not_as_well_known_as_before(folder: Path) -> None:
+    _, calibration, few = after_a_repair(folder)
+    found = told("calibrate", calibration, few, "--model=geometric", "--out", folder / "anew")
+    assert found.says("rank-loss", "error", "earlier calibration knew the geometry.*model=offsets"), found
+    nominal = told("calibrate", "irb120", few, "--model=geometric", "--out", folder / "first")
+    assert nominal.says("rank-loss", "error")
+    assert "earlier calibration" not in nominal.messages["rank-loss"]
 
 
 # -- validation ------------------------------------------------------------------------------------------------

@@ -135,18 +135,6 @@ def a_fifth_off(p: Array, data: Dataset) -> Array:
     return p
 
 
-def each_twice(data: Dataset, *, own_readings: bool) -> Dataset:
-    """Return data in which every configuration stands twice, read anew or copied with fewer digits."""
-    twin, _ = honest()
-    again = measure(twin, data.joints, NOISE, np.random.default_rng(7)).position if own_readings else data.position
-    return Dataset.of(
-        np.concatenate([data.joints, data.joints]),
-        np.concatenate([data.position, again.round(6)]).reshape(-1, len(data.targets), 3),
-        sigma=NOISE,
-        source="twice",
-    )
-
-
 def lagging(q: Array) -> Array:
     """Return joint positions of a moment before: two per cent of the way is still to go."""
     return np.concatenate([q[:1], q[1:] - 0.02 * np.diff(q, axis=0)])
@@ -299,16 +287,6 @@ LIES: Final[dict[str, Lie]] = {
     "block-of-readings-pasted": Lie(with_positions(pasted_readings), "check", "joints-mistaken", "warning", "11 "),
     "block-of-joints-pasted": Lie(with_joints(pasted_joints), "check", "joints-repeated", "warning", "11 "),
     "instrument-stuck": Lie(with_positions(stuck), "check", "duplicates", "warning", "11"),
-    "each-configuration-read-twice": Lie(
-        lambda data: each_twice(data, own_readings=True),
-        "calibrate",
-        "held-out-seen",
-        "warning",
-        "same joint positions",
-    ),
-    "copies-with-fewer-digits": Lie(
-        lambda data: each_twice(data, own_readings=False), "calibrate", "held-out-seen", "warning", ""
-    ),
     "a-fifth-of-the-readings-off": Lie(with_positions(a_fifth_off), "check", "outliers", "warning", "1[0-9]%"),
     # half-way
     "instrument-moved": Lie(

@@ -106,6 +106,14 @@ def test_a_plan_says_what_noise_it_assumes() -> None:
         assert planned.answer[-1] in planned.lines()
 
 
+def test_a_plan_says_what_its_figure_leaves_out() -> None:
+    for robot, model, loads in (("irb120", "offsets", True), ("kr5", "offsets", False)):
+        planned = truearm.plan(robot, poses=8, candidates=30, model=model, seed=3)
+        assert planned.summary()["prediction"]["loads_left_out"] is loads
+        assert ("Plan with `model=elastic`" in planned.answer[-1]) is loads
+        assert "has more to find than offsets: it is not planned for" in planned.answer[-1]
+
+
 POSES = """pose,x [mm],y [mm],z [mm],qw,qx,qy,qz
 a,400,0,300,0,0,1,0
 b,450,100,300,0,0,1,0

@@ -53,7 +53,8 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
         "auto: every joint effect, as large as the data tell; offsets, joints, geometric, elastic, tilting, full; "
         "frames: base, tool and fixtures alone.",
         default=None,
-        shown=f"auto where loads are known or {ENOUGH} configurations are trained on, else geometric",
+        shown=f"auto where loads are known or {ENOUGH} configurations are trained on, else geometric; offsets for "
+        "fewer where the robot was calibrated before",
         more="It is ``geometric`` too with `effects`, `zones`, `monte_carlo`, a `redundancy` other than ``prior``, and "
         "where readings are lengths or of fixtures, or an error of the data is told. "
         "``auto`` chooses nothing: what the training part does not support shrinks to nothing.",
@@ -185,6 +186,7 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
             training: The training part.
         """
         from truearm.engine.fit.every_effect import AUTO, loads_bend
+        from truearm.engine.robot.robot_file.seal import calibrated_soundly
 
         if self.model is not None:
             return self.model, ""
@@ -198,9 +200,11 @@ class Calibrate(OfData, Split, Loaded, Excluding, Noted, IntoFolder, Repeatable,
         for reason, is_so in because.items():
             if is_so:
                 return "geometric", reason
+        count = training.configurations
+        if count < ENOUGH and calibrated_soundly(robot):
+            return "offsets", f"the robot was calibrated before, and {count} configurations are few"
         if loads_bend(robot, training):
             return AUTO, "loads are known"
-        count = training.configurations
         if count >= ENOUGH:
             return AUTO, f"{count} configurations are enough"
         return "geometric", f"loads are not known, and {count} configurations are few"

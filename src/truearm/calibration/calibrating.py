@@ -28,7 +28,6 @@ from truearm.engine.command.arguments import (
 )
 from truearm.engine.command.reading import Excluded, check_excluded, count_excluded, in_parts, without_excluded
 from truearm.engine.command.split import (
-    check_copies,
     check_split,
     check_trained_before,
     left_out,
@@ -37,6 +36,7 @@ from truearm.engine.command.split import (
     without_words,
 )
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.parting import parted
 from truearm.engine.data.statistics import errors_of, without_table_motion
 from truearm.engine.data.thinning import readings_digest
 from truearm.engine.diagnose.base_changes import checked_parts, with_one_base
@@ -72,9 +72,7 @@ from truearm.engine.fit.rounds import Redundant
 from truearm.engine.fit.solver import watching
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import urdf_source
-from truearm.engine.robot.proof import Proof
 from truearm.engine.robot.robot import Robot
-from truearm.engine.robot.robot_file.seal import is_intact
 
 if TYPE_CHECKING:
     from truearm.calibration.calibrate import Calibrate
@@ -298,8 +296,7 @@ def _split(asked: Calibrate, read: _Read) -> _Parts:
     """Check the data, and part them into what is trained on and what judges."""
     readings = read.readings
     count = train_count(asked.train, readings.configurations, readings.source)
-    order = np.random.default_rng(asked.seed).permutation(readings.configurations)
-    training, held_out = order[:count], order[count:]
+    training, held_out = parted(readings.joints, readings.joint_kinds, count, asked.seed)
     model, because = _model(asked, read.robot, readings.of_configurations(training))
     excluded = in_parts(read.excluded, readings, held_out)
     if not readings.has_reading.any():
@@ -388,7 +385,6 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
             parts.held_out,
             validation,
         ),
-        *check_copies(parts.readings, parts.training, parts.held_out),
         *check_trained_before(
             solved.robot,
             read.as_read,
@@ -445,7 +441,6 @@ def _judged(asked: Calibrate, read: _Read, parts: _Parts, solved: _Identified) -
         urdf=read.urdf,
         shares=solved.shares,
         because=parts.because,
-        known_before=_known_before(solved.robot),
         without=tuple(asked.without),
         excluded=parts.excluded,
         notes=dict(asked.notes or {}),
@@ -489,10 +484,3 @@ def _beside_nominal(
     doubted = fit.loss in PULLED and any(notice.code in DOUBTED for notice in noticed)
     nominal = place(fit.start, training, "cauchy", fixed) if doubted else placed
     return check_gain(errors_of(nominal, held_out), errors_of(fit.robot, held_out), held_out, doubted=doubted)
-
-
-def _known_before(robot: Robot) -> Proof | None:
-    """Return what is known of a robot already; of one whose values were changed since, only what speaks against it."""
-    if robot.proof is None or is_intact(robot):
-        return robot.proof
-    return replace(robot.proof, names=(), deviations=(), factor=())

@@ -307,9 +307,10 @@ def proof_of(
     warnings: Sequence[Notice],
     expected: ExpectedError,
     training: Dataset,
-    before: Proof | None = None,
 ) -> Proof:
     """Return what a calibration knows about its result.
+
+    What spoke against an earlier calibration speaks against parameters of the arm that this one has left as they were.
 
     Args:
         fit: Of the training part.
@@ -317,47 +318,34 @@ def proof_of(
         warnings: All notices of the calibration.
         expected: The error to expect over the workspace.
         training: The training part.
-        before: What was known of the robot already. It holds for the parameters of the arm that this fit has not
-            touched, as where only base and targets are found anew; and if there are any, so does what spoke against
-            them.
     """
-    ended, joint_error = status.value, expected.joint_error
+    ended, before = status.value, fit.before
     errors = [notice for notice in warnings if notice.level == "error"]
     repeated = [notice for notice in warnings if notice.code in _REPEATED]
-    lower_bound = expected.lower_bound
     fixed = [*fixed_by(fit)]
     names, root = uncertain_names(fit), covariance_root(fit, fit.covariance_with_unfitted)
-    parameters, covariance = [fit.robot.parameters[name] for name in names], root @ root.T
     region = list(zip(training.joints.min(axis=0).tolist(), training.joints.max(axis=0).tolist(), strict=True))
     measured = training.joints.tolist()
     loads = loads_of(fit.robot, training.postures)
     if before is not None:
-        arm = {n: p for n, p in fit.robot.parameters.items() if p.group not in PLACES}
-        earlier = [i for i, name in enumerate(before.names) if name in arm and name not in names]
-        if earlier or not any(name in arm for name in names):
-            ended = before.status if ended in SOUND else ended
-            errors += [error for error in before.errors if error.code not in [e.code for e in errors]]
-            repeated += [warning for warning in before.warnings if not repeated]
-            parameters += [arm[before.names[i]] for i in earlier]
-            region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
-            measured = [*before.measured, *measured] if before.measured else []
-            # By older versions nothing is known of the loads before.
-            pairs = zip(loads, before.loads, strict=True) if before.loads else ()
-            loads = [(min(a, c), max(b, d)) for (a, b), (c, d) in pairs]
-            joint_error = np.maximum(joint_error, before.joint_error or 0.0)
-            lower_bound = lower_bound or before.lower_bound
-            fixed += [word for word in before.held if word in HELD and word not in fixed]
-            beside = np.zeros((len(covariance), len(earlier)))
-            covariance = np.block([[covariance, beside], [beside.T, before.covariance[np.ix_(earlier, earlier)]]])
+        ended = before.status if ended in SOUND else ended
+        errors += [error for error in before.errors if error.code not in [e.code for e in errors]]
+        repeated += [warning for warning in before.warnings if not repeated]
+        region = [(min(a, c), max(b, d)) for (a, b), (c, d) in zip(region, before.region or region, strict=True)]
+        measured = [*before.measured, *measured] if before.measured else []
+        # By older versions nothing is known of the loads before.
+        pairs = zip(loads, before.loads, strict=True) if before.loads else ()
+        loads = [(min(a, c), max(b, d)) for (a, b), (c, d) in pairs]
+        fixed += [word for word in before.held if word in HELD and word not in fixed]
     return Proof.of(
         ended,
         errors,
         region,
-        joint_error,
-        parameters,
-        covariance,
+        expected.joint_error,
+        [fit.robot.parameters[name] for name in names],
+        root @ root.T,
         warnings=repeated,
-        lower_bound=lower_bound,
+        lower_bound=expected.lower_bound,
         held=fixed,
         measured=measured,
         joint_units=["deg" if joint.kind == "revolute" else "mm" for joint in fit.robot.joints],

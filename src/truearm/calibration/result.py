@@ -54,7 +54,6 @@ from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.fit.zones import ZoneVerdict, flange_places
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.parameters import Parameter
-from truearm.engine.robot.proof import Proof
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import sealed
 from truearm.engine.robot.robot_file.writing import robot_text
@@ -86,7 +85,6 @@ class Calibration(Record):
     shares: Shares | None = None  #: What every effect does, where all are in the model; else None.
     because: str = ""  #: Why the model is this one; empty if it was named.
     inputs: tuple[Path, ...] = ()  #: The files that were read: none of them is overwritten.
-    known_before: Proof | None = None  #: What was known of the robot from an earlier calibration; None if nothing was.
     without: tuple[str, ...] = ()  #: Labels of the configurations that were left out; `data` does not have them.
     excluded: tuple[Excluded, ...] = ()  #: Readings that were excluded; `data` have none there.
     notes: dict[str, str] = field(default_factory=dict)  #: What the user noted, by its name.
@@ -104,7 +102,7 @@ class Calibration(Record):
     def robot(self) -> Robot:
         """The calibrated robot, base and targets included, with what the calibration knows about it."""
         training = self.data.of_configurations(self.training)
-        proof = proof_of(self.fit, self.status, self.warnings, self.expected, training, self.known_before)
+        proof = proof_of(self.fit, self.status, self.warnings, self.expected, training)
         calibrated = replace(self.fit.robot, history=(*self.fit.robot.history, self.history), tools={}, truths={})
         return sealed(calibrated, proof)
 
@@ -336,7 +334,7 @@ class Calibration(Record):
         inside = np.flatnonzero(verdict.box.holds(flange_places(self.fit.start, training.postures), self.zones.overlap))
         part = training.of_configurations(inside)
         expected = expected_error(fit, by_order=moved_by_order(fit.robot, part))
-        proof = proof_of(fit, fit.status, self.warnings, expected, part, self.known_before)
+        proof = proof_of(fit, fit.status, self.warnings, expected, part)
         line = f"{self.history}, zone {verdict.box.name}"
         return sealed(replace(fit.robot, history=(*fit.robot.history, line), tools={}, truths={}), proof)
 

@@ -14,7 +14,9 @@ from truearm.engine.document.records import Record, joints_lines
 from truearm.engine.motion.tour import Tour, sheet_beside, tour_csv, tour_summary, tour_words, ways_beside
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
+from truearm.engine.robot.effects import EFFECTS
 from truearm.engine.robot.library.wider_limits import wider_limits_notices
+from truearm.engine.robot.loads import has_weight
 from truearm.planning.accuracy import There
 from truearm.planning.choosing import ERROR, MeasurementPlan, plan_csv
 from truearm.planning.plan_program import PLAN_PAGE, SHEET, TABLE, WAYS, PlanProgram
@@ -138,9 +140,28 @@ class Plan(Record):
         numbers = zip(prediction.numbers, prediction.chosen.tolist(), prediction.random.tolist(), strict=True)
         yield say(
             f"That assumes that a coordinate of a reading is off by {significant(self.noise * 1e3, 3)} mm about the "
-            "model, by the instrument and by what the model cannot follow; give `noise` where you know better.",
+            "model, by the instrument and by what the model cannot follow; give `noise` where you know better."
+            f"{self._not_planned}",
+            loads_left_out=self._leaves_loads_out,
             by_number=[{"poses": int(n), "chosen_mm": c * 1e3, "random_mm": r * 1e3} for n, c, r in numbers],
         )
+
+    @property
+    def _leaves_loads_out(self) -> bool:
+        """Whether joints give way under loads that are known, and the model does not follow it."""
+        follows = any(effect.loaded for effect in EFFECTS if effect.name in self.made.model.effects)
+        return has_weight(self.made.robot) and not follows
+
+    @property
+    def _not_planned(self) -> str:
+        """What the figures leave out, in words that follow others."""
+        name, words = self.made.model.name, ""
+        if self._leaves_loads_out:
+            words = (
+                f" Masses are known, and the {name} model does not follow how far joints give way under them: that is "
+                "in no figure, and may be many times as much. Plan with `model=elastic`."
+            )
+        return f"{words} The model auto of 'truearm calibrate' has more to find than {name}: it is not planned for."
 
     def _wanted_accuracy(self, accuracy: There) -> Iterator[Block]:
         """Give how accurate the robot will be where it shall be, in mm."""

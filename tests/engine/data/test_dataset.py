@@ -305,18 +305,14 @@ def test_a_bootstrap_is_the_fit_with_weights() -> None:
     assert np.abs(twice - plain).max() > 1e-6
 
 
-def test_copies_that_the_fit_has_seen_prove_nothing() -> None:
+def test_copies_are_not_held_out_from_what_they_are_copies_of() -> None:
     rng, true = np.random.default_rng(4), off_nominal()
     q = true.random_configurations(40, rng)
     data = Dataset.of(q, true.forward(q, frame="world", target="1")[0] + rng.normal(0.0, 1e-5, (40, 3)))
     drawn = calibrate("irb120", data.of_configurations(rng.integers(0, 40, 40)), model="geometric")
     origins = np.array([label.partition("#")[0] for label in drawn.data.labels])
-    (said,) = [w.message for w in drawn.warnings if w.code == "held-out-seen"]
-    assert said.startswith("Of 12 held-out configurations ")
-    assert {*origins[drawn.training]} & {*origins[drawn.held_out]}
-    assert "held-out-seen" not in [w.code for w in calibrate("irb120", data, model="geometric").warnings]
-    alone = calibrate("irb120", data.of_configurations([*range(40), 0]), train=40, seed=2, model="geometric")
-    assert ("held-out-seen" in [w.code for w in alone.warnings]) is bool({0, 40} & {*alone.held_out.tolist()})
+    assert len({*origins}) < 30
+    assert not {*origins[drawn.training]} & {*origins[drawn.held_out]}
 
 
 def test_a_bootstrap_is_not_told_to_remove_its_copies() -> None:

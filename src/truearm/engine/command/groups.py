@@ -261,7 +261,8 @@ class Split(Drawn):
         "Configurations to train on; the rest judges.",
         default=None,
         shown="70 %",
-        more="They are the first of ``numpy.random.default_rng(seed).permutation(n)``; ``all`` holds nothing out.",
+        more="They are the first of ``numpy.random.default_rng(seed).permutation(n)``; ``all`` holds nothing out. "
+        "Where joints come back to a posture, all configurations there are in one part.",
     )
 
 

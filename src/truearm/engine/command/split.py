@@ -23,8 +23,8 @@ from truearm.engine.base.errors import (
 from truearm.engine.base.files import exists
 from truearm.engine.base.manifest import written_differently
 from truearm.engine.command.arguments import choices_argument
-from truearm.engine.data.dataset import Dataset, IntArray
-from truearm.engine.data.thinning import copies, readings_digest, revisits
+from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.thinning import readings_digest
 from truearm.engine.robot.controller import OTHER_ARM
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.robot_file.seal import arm_is_known, is_intact
@@ -138,44 +138,6 @@ def train_count(train: object, n: int, where: str) -> int:
             allowed=f"1 to {n - 1}, or all ({where} has {n} configurations)",
         )
     return int(train)
-
-
-HELD_OUT_SEEN: Final = Rule(
-    "held-out-seen",
-    "warning",
-    "held-out configurations are copies of training ones, or have their joint positions: their errors flatter the fit",
-    gravity=2,
-)
-
-
-def check_copies(data: Dataset, training: IntArray, held_out: IntArray) -> list[Notice]:
-    """Say if the fit has seen what was held out: copies, or other readings at the same joint positions."""
-    seen = copies(data, held_out, training)
-    known = set(seen)
-    again = [label for label in revisits(data, held_out, training) if label not in known]
-    if not seen and not again:
-        return []
-    parts = []
-    if seen:
-        parts.append(f"{len(seen)} {'is a copy' if len(seen) == 1 else 'are copies'} of training ones ({listed(seen)})")
-    if again:
-        parts.append(
-            f"{len(again)} {'has' if len(again) == 1 else 'have'} the same joint positions as training ones "
-            f"({listed(again)})"
-        )
-    cures = ["Leave copies out; for a bootstrap, draw from the training configurations alone and use `train=all`."]
-    return [
-        HELD_OUT_SEEN(
-            f"Of {counted(len(held_out), 'held-out configuration')} {' and '.join(parts)}: the fit has seen them, and "
-            f"the errors flatter it. "
-            + " ".join(
-                [
-                    *(cures if seen else []),
-                    *(["Judge it at other joint positions with 'truearm validate'."] if again else []),
-                ]
-            )
-        )
-    ]
 
 
 TRAINING_DATA: Final = Rule(

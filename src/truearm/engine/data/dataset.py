@@ -24,6 +24,7 @@ from truearm.engine.data.dataset_fields import (
     distinct_labels,
     refuse_unsound,
 )
+from truearm.engine.data.parting import parted
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.controller import JointsOf
 from truearm.engine.robot.postures import Postures, approach_of
@@ -324,7 +325,8 @@ class Dataset:
         train
             The share to train on, above 0 and below 1, or how many: 1 to all but one.
         seed
-            Of the split: training is the first part of ``numpy.random.default_rng(seed).permutation(n)``.
+            Of the split: training is the first part of ``numpy.random.default_rng(seed).permutation(n)``. Where joints
+            come back to a posture, all configurations there are in the part of the first.
 
         Raises
         ------
@@ -344,8 +346,8 @@ class Dataset:
         whole = finite_number(seed, "seed")
         if whole < 0 or whole != int(whole):
             raise InputError("a whole number from 0 belongs here", parameter="seed", came=seed)
-        order = np.random.default_rng(int(whole)).permutation(n)
-        return self.of_configurations(order[:count]), self.of_configurations(order[count:])
+        training, judging = parted(self.joints, self.joint_kinds, count, int(whole))
+        return self.of_configurations(training), self.of_configurations(judging)
 
     def _at(self, indices: IntArray) -> Dataset:
         times = np.bincount(indices, minlength=self.configurations)

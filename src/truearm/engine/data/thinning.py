@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from truearm.engine.base.errors import Notice, Rule, counted, listed
-from truearm.engine.data.dataset import Dataset, IntArray
+from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.dataset_fields import drawn_from
 
 #: Readings at the same joint positions agree within this, whatever loads the arm and from wherever it came [m].
 _LARGEST_CHANGE: Final = 5e-3
-#: A joint comes back to a posture within this [rad or m]: a hundredth of a degree or of a millimetre.
-_SAME_ANGLE: Final = math.radians(0.01)
-_SAME_LENGTH: Final = 1e-5
-
 
 JUDGED_IN_PART: Final = Rule(
     "judged-in-part",
@@ -54,21 +49,6 @@ def check_duplicates(data: Dataset) -> list[Notice]:
     ]
 
 
-def copies(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
-    """Return the labels of those of `some` configurations that are copies of one of the `others`.
-
-    Copies have the same joint positions and the same readings, all to the last digit.
-    """
-    values = [data.target[:, None], data.against[:, None], data.position]
-    values += [v.reshape(len(v), -1) for v in (data.quaternion, data.distance, data.height) if v is not None]
-    read: list[list[bytes]] = [[] for _ in data.labels]
-    for reading, row in zip(np.flatnonzero(data.has_reading), np.hstack(values)[data.has_reading], strict=True):
-        read[data.configuration[reading]].append(row.tobytes())
-    content = [(joints.tobytes(), *sorted(rows)) for joints, rows in zip(data.joints, read, strict=True)]
-    known = {content[c] for c in others if read[c]}
-    return [data.labels[c] for c in some if content[c] in known]
-
-
 def readings_digest(data: Dataset) -> str:
     """Return a SHA-256 of joint positions and readings, whatever their order, units, names and file.
 
@@ -81,15 +61,6 @@ def readings_digest(data: Dataset) -> str:
     values += [v.reshape(len(v), -1) * 1e3 for v in (data.quaternion, data.distance, data.height) if v is not None]
     rows = np.round(np.hstack(values)[data.has_reading], 4) + 0.0
     return hashlib.sha256(b"".join(sorted(row.tobytes() for row in rows))).hexdigest()
-
-
-def revisits(data: Dataset, some: IntArray, others: IntArray) -> list[str]:
-    """Return the labels of those of `some` configurations at which the joints stand as at one of the `others`."""
-    if len(some) == 0 or len(others) == 0:
-        return []
-    same = np.array([_SAME_ANGLE if kind == "revolute" else _SAME_LENGTH for kind in data.joint_kinds])
-    scaled = data.joints / same
-    return [data.labels[c] for c in some.tolist() if (np.abs(scaled[others] - scaled[c]).max(axis=1) <= 1.0).any()]
 
 
 def repeated_joints(data: Dataset) -> list[tuple[str, str]]:

@@ -73,6 +73,12 @@ def check_fit(fit: Fit, expected: ExpectedError, *, explained: bool = False) -> 
             f"The training data do not determine {', '.join(fit.unobservable)}, and predictions elsewhere depend on "
             "them."
         )
+        if fit.found_anew:
+            words += (
+                " An earlier calibration knew the geometry. This one finds it anew, and takes it for as uncertain as "
+                "its priors. The expected error holds if it has changed by about so much. If only the joint zeros have "
+                "changed, `model=offsets` finds them, and leaves the geometry as well known as it was."
+            )
         sound = fit.status is not Status.RANK_LOSS
         notices.append(
             PRIORS_DECIDE(f"{words} Their values are what is known of any such robot, and so uncertain.")

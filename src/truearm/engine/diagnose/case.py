@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
+import numpy as np
+
 from truearm.engine.base.errors import Notice, has_error
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.rigid_tool import OUTLIERS, TARGET_MISTAKEN, TARGETS_SWAPPED
@@ -130,7 +132,9 @@ class Case:
     def expected(self) -> ExpectedError:
         """How accurate the robot is where it was not measured."""
         doubted = has_error([*self.of_data, *self.changes]) or any(n.code in _DOUBTING for n in self.of_data)
-        allowed = as_residuals_allow(self.fit, self.training)
+        allowed, before = as_residuals_allow(self.fit, self.training), self.fit.before
+        if before is not None and before.joint_error:
+            allowed = replace(allowed, joint_error=np.maximum(allowed.joint_error, before.joint_error))
         by_order = moved_by_order(self.fit.robot, self.training)
         return expected_error(
             allowed, unseen=self.unseen, by_order=by_order, plausible=not self.implausible, doubted=doubted

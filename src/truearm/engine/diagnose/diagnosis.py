@@ -96,7 +96,7 @@ def _check_narrow(case: Case) -> list[Notice]:
     if (case.few and not case.held_out) or (too_large and not hiding):
         return []
     fit, narrow = case.fit, list[Notice]()
-    if fit.model.groups and "geometry" not in fit.model.groups:
+    if fit.model.groups and not fit.knows_geometry:
         narrow = check_narrow_data_without_geometry(fit, case.training, case.errors, fit.loss, held_out=case.held_out)
     return narrow or check_narrow_data(fit, case.expected, case.training, case.errors, held_out=case.held_out)
 

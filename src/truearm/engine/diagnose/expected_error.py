@@ -192,8 +192,10 @@ def _omissions(fit: Fit, by_joints: float, overall: Expectation, *, plausible: b
         yield "the fit did not converge"
     if not plausible:
         yield "what was fitted cannot be this robot"
-    if "geometry" not in fit.model.groups:
+    if not fit.knows_geometry:
         yield "the robot's own geometry counts as exact"
+    if fit.before is not None and fit.before.lower_bound:
+        yield "the calibration before left out what may do more"
     if fit.at_bound:
         yield "values at a bound count as exact"
     if doubted and (fit.excess > 1.0 or by_joints**2 > _LEAST_BY_JOINTS * overall.mean**2):

@@ -18,6 +18,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fit import Fit, fit_of, refit_draws
 from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
+from truearm.engine.fit.known_before import with_proof_of_its_values
 from truearm.engine.fit.losses import Loss
 from truearm.engine.fit.models import Model, named_model
 from truearm.engine.fit.rounds import Redundant, Solved, evaluated, factors_of, find_parameters, informed_rows
@@ -142,6 +143,7 @@ def identify_every_effect(
     """
     progress(f"identifying every joint effect on {data.configurations} configurations")
     lines: tuple[PeriodicError, ...] = ()
+    robot = with_proof_of_its_values(robot)
     find = partial(
         find_parameters,
         data=data,

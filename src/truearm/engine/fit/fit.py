@@ -14,6 +14,7 @@ from truearm.engine.base.errors import InputError
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.fit.bounds import Bounds
 from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
+from truearm.engine.fit.known_before import known_before, part_known_before, with_proof_of_its_values
 from truearm.engine.fit.likelihood import Visits
 from truearm.engine.fit.losses import ABSOLUTE, Loss, pulls, scales_of_pulls
 from truearm.engine.fit.models import FRAMES, Model
@@ -47,7 +48,8 @@ from truearm.engine.fit.start_values import start_from_readings, unanchored
 from truearm.engine.fit.variance_components import Components, CovariancePart, cluster_covariance, widening
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.effects.warm_up import LEFT, RATE, share_left
-from truearm.engine.robot.parameters import SCALE, FreeParameters, Parameter
+from truearm.engine.robot.parameters import PLACES, SCALE, SCALE_GROUP, FreeParameters, Parameter
+from truearm.engine.robot.proof import Proof
 from truearm.engine.robot.robot import Robot
 
 #: Configurations below which draws are too much alike.
@@ -187,8 +189,28 @@ class Fit:
     fixed: FixedPlaces = NOTHING_FIXED  #: Places that were known, and not found.
     bootstrap: int = 0  #: How many fits to configurations drawn anew the covariance follows from; 0 if from none.
     #: Parameters that are uncertain although they were not fitted: coefficients of joint curves that are zero because
-    #: the data could not tell them, and how warm the arm is in another session.
+    #: the data could not tell them, how warm the arm is in another session, and `as_before`.
     unfitted: tuple[str, ...] = ()
+    #: Parameters of the arm that stay as an earlier calibration found them, and as uncertain.
+    as_before: tuple[str, ...] = ()
+
+    @property
+    def before(self) -> Proof | None:
+        """What an earlier calibration knows of the arm, where this fit leaves some of it, or all, as it was."""
+        arm_is_found = any(p.group not in (*PLACES, SCALE_GROUP) for p in self.free.parameters)
+        return self.start.proof if self.as_before or not arm_is_found else None
+
+    @property
+    def knows_geometry(self) -> bool:
+        """Whether the geometry of the arm is uncertain, as found or as before, and does not count as exact."""
+        groups = [self.robot.parameters[name].group for name in self.as_before]
+        return "geometry" in (*self.model.groups, *groups)
+
+    @property
+    def found_anew(self) -> bool:
+        """Whether it finds geometry that an earlier calibration knew."""
+        before = () if self.start.proof is None else self.start.proof.names
+        return any(p.group == "geometry" and p.name in before for p in self.free.parameters)
 
     def parameter_status(self, name: str) -> ParameterStatus:
         """Return how much the value of a parameter is worth."""
@@ -259,7 +281,7 @@ def identify(
             keep, too few equations without priors, nothing to find, or too few configurations to draw from.
     """
     solved = find_parameters(
-        robot,
+        with_proof_of_its_values(robot),
         data,
         model,
         loss=loss,
@@ -310,7 +332,11 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
     if problem.data.number is not None and LEFT in start.parameters:
         share = share_left(problem.data.number, in_the_middle(solved.robot, problem.data).values[RATE])
         parts, unfitted = _with_uncertain(parts, float(share.var())), (*unfitted, LEFT)
-    found = [*_identified(solved, covariance, informed, at_bound), *_shrunk(solved, parts, unfitted)]
+    as_before = known_before(solved.start, {*free.names, *unfitted, *(r.dropped for r in solved.redundancies)})
+    if as_before:
+        covariance, parts = _beside_what_was_known(solved, as_before, covariance, parts, at_bound, scattered)
+        unfitted = (*unfitted, *as_before)
+    found = [*_identified(solved, covariance, informed, at_bound), *_uncertain(solved, parts, unfitted, as_before)]
     robot = in_the_middle(start.with_parameters(found), problem.data)
     dropped = tuple(robot.parameters[r.dropped] for r in solved.redundancies)
     # What is expected of these is found from the data, and their deviations say where nothing else is known.
@@ -358,6 +384,7 @@ def fit_of(solved: Solved, model: Model, loss: Loss, draws: Array | None = None)
         fixed=solved.fixed,
         bootstrap=0 if draws is None else len(draws),
         unfitted=unfitted,
+        as_before=as_before,
     )
 
 
@@ -372,12 +399,14 @@ def _identified(solved: Solved, covariance: Array, informed: Array, at_bound: ND
     ]
 
 
-def _shrunk(solved: Solved, parts: Sequence[CovariancePart], unfitted: Sequence[str]) -> list[Parameter]:
-    """Return the parameters of effects that shrank to nothing, with what they may be off by."""
+def _uncertain(
+    solved: Solved, parts: Sequence[CovariancePart], unfitted: Sequence[str], as_before: Sequence[str]
+) -> list[Parameter]:
+    """Return the parameters of effects that shrank to nothing, and those as before, with what they may be off by."""
     deviation = np.sqrt(np.diag(np.sum([part.covariance for part in parts], axis=0)))
-    effects = solved.sizes.place.keys() - solved.sizes.curves.keys()
+    told = dict.fromkeys(solved.sizes.place.keys() - solved.sizes.curves.keys(), 0.0) | dict.fromkeys(as_before)
     beside = zip(unfitted, deviation[len(solved.problem.free.names) :].tolist(), strict=True)
-    return [replace(solved.start.parameters[n], deviation=d, informed=0.0) for n, d in beside if n in effects]
+    return [replace(solved.start.parameters[n], deviation=d, informed=told[n]) for n, d in beside if n in told]
 
 
 def _sigma_of(name: str, problem: Problem, components: Components | None, is_declared: bool) -> float:
@@ -402,7 +431,7 @@ def _worth(
     else:
         covariance, parts = cluster_covariance(
             lambda: _pulled(problem, solution, loss),
-            Visits(problem.visits),
+            Visits(problem.standings),
             ~at_bound,
             _beforehand(problem, limits, open_),
         )
@@ -419,21 +448,42 @@ def _worth(
         informed = np.where(bounded, np.minimum(informed, of_bounds), informed)
     parts, unfitted = tuple(part.scaled(free.prior) for part in parts), tuple[str, ...]()
     if solved.sizes:
-        known = dict(zip(free.names, x.tolist(), strict=True))
-        at_solution = replace(
-            problem,
-            robot=problem.robot.with_values(known),
-            free=FreeParameters(tuple(replace(p, value=known[p.name]) for p in free.parameters)),
-        )
-        joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
+        at_solution, joints = _at_solution(solved, scattered)
         alone = parts[0] if scattered or draws is not None else None
         erring = joints > 0.0 if components is None else components.likeliest.joints > 0.0
         unfitted, parts, told = parts_with_sizes(
-            at_solution, solved.sizes, joints, erring, solution.weight, at_bound, alone
+            at_solution, solved.sizes, joints, erring, solution.weight / problem.times_visited, at_bound, alone
         )
         covariance = np.sum([part.covariance for part in parts], axis=0)[: len(x), : len(x)]
         informed = np.clip(told[: len(x)], 0.0, 1.0)
     return covariance, parts, informed, unfitted
+
+
+def _at_solution(solved: Solved, scattered: bool) -> tuple[Problem, Array]:
+    """Return the problem whose parameters have the values found, and the variances of the joints' errors there."""
+    problem, components = solved.problem, solved.components
+    values = dict(zip(problem.free.names, solved.solution.vector.tolist(), strict=True))
+    free = FreeParameters(tuple(replace(p, value=values[p.name]) for p in problem.free.parameters))
+    joints = np.zeros(len(solved.start.joints)) if components is None or scattered else components.weighing.joints
+    return replace(problem, robot=problem.robot.with_values(values), free=free), joints
+
+
+def _beside_what_was_known(
+    solved: Solved,
+    names: tuple[str, ...],
+    covariance: Array,
+    parts: tuple[CovariancePart, ...],
+    at_bound: NDArray[np.bool_],
+    scattered: bool,
+) -> tuple[Array, tuple[CovariancePart, ...]]:
+    """Return the covariance of the free parameters, and its parts, with that of parameters that were known before."""
+    problem, joints = _at_solution(solved, scattered)
+    known = part_known_before(problem, names, joints, solved.solution.weight, at_bound)
+    own, n = len(parts[0].covariance), len(problem.free.names)
+    place = np.arange(own + len(names))
+    *others, last = (part.among(place < own) for part in parts)
+    known = known.among((place < n) | (place >= own))
+    return covariance + known.covariance[:n, :n], (*others, known, last)
 
 
 def _with_uncertain(parts: tuple[CovariancePart, ...], variance: float) -> tuple[CovariancePart, ...]:

@@ -198,6 +198,9 @@ class Linearised:
     #: Of the derivative by the parameters, ``(k, parameters)``, where it is known: products of its columns are those of
     #: all equations.
     triangle: Array | None = None
+    #: Which equations share what the model cannot follow: those of visits at which the joints stand alike; None where
+    #: no visits do.
+    standings: Visits | None = None
 
     @property
     def directions(self) -> Array:

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from truearm.engine.base.errors import InputError
 from truearm.engine.base.limits import limit, refuse_beyond
 from truearm.engine.data.dataset import Dataset
+from truearm.engine.data.dataset_fields import drawn_from
 from truearm.engine.data.observations import OBSERVATIONS, Observation, Sighting, compared
+from truearm.engine.data.parting import postures_of
 from truearm.engine.fit.fixed_places import NOTHING_FIXED, FixedPlaces
 from truearm.engine.robot.chain import Array, ForwardKinematics, together
 from truearm.engine.robot.parameters import (
@@ -172,6 +174,32 @@ class Problem:
             size = block.observation.components
             rows.append((place.start + size * readings[:, None] + np.arange(size)).reshape(-1))
         return np.concatenate(rows), part
+
+    @cached_property
+    def standings(self) -> NDArray[np.intp]:
+        """Index of the posture that each equation belongs to, ``(rows,)``: visits at which the joints stand alike.
+
+        What the model cannot follow is the same there. Configurations that were drawn to count twice stand alone, and
+        so do all where the problem comes in portions.
+        """
+        data = self.data
+        if len(self.portions) > 1 or any(drawn_from(label) != label for label in data.labels):
+            return self.visits
+        posture = postures_of(data.joints, data.joint_kinds)
+        of_blocks = [
+            np.repeat(posture[block.data.configuration[block.readings]], block.observation.components)
+            if block.data is data
+            else np.full(block.rows, -1)
+            for block in self.blocks
+        ]
+        at = np.concatenate([np.zeros(0, np.intp), *of_blocks])
+        return np.unique(np.where(at < 0, len(posture) + self.visits, at), return_inverse=True)[1].reshape(-1)
+
+    @cached_property
+    def times_visited(self) -> NDArray[np.intp]:
+        """How often the joints came to the posture of each reading, ``(readings,)``."""
+        pairs = np.unique(np.stack([self.standings, self.visits]), axis=1)[0]
+        return np.asarray(np.bincount(pairs)[self.standings[np.cumsum(self.components) - 1]])
 
     def at(self, vector: Array) -> Evaluation:
         """Compare the robot with the readings at a vector ``(parameters,)``, or at one for each of many trials."""

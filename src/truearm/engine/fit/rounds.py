@@ -458,6 +458,7 @@ def estimated_components(
         offset=((solution.vector - problem.free.nominal) / prior)[uncertain],
         priors=problem.priors,
         visits=Visits(problem.visits),
+        standings=Visits(problem.standings),
         factor=of_row,
         triangle=evaluation.triangle[:, uncertain] * prior[uncertain],
     )

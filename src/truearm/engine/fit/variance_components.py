@@ -294,8 +294,9 @@ def _agree(alone: Likelihood, best: Likelihood) -> bool:
 def _independent(state: Likelihood) -> bool:
     """Return whether the pulls of visits on the parameters are no larger than those of independent ones.
 
-    The sum of their squares, in deviations of the parameters, is what an estimate from the scatter of the visits
-    finds of the parameters' variance, by what the variances say (the idea of White 1982).
+    Visits at which the joints stand alike pull together. The sum of the squares, in deviations of the parameters, is
+    what an estimate from the scatter of the visits finds of the parameters' variance, by what the variances say (the
+    idea of White 1982).
     """
     at = state.of.at
     root = np.sqrt(state.factors)[at.factor]
@@ -304,9 +305,10 @@ def _independent(state: Likelihood) -> bool:
     for rows, Q, z in at.turned():
         part = whitening.of(rows)
         X = np.asarray(np.linalg.solve(state.L, part.applied(Q / root[rows, None]).T).T, dtype=np.float64)
-        pulls = part.visits.products(X, part.applied((z - Q @ state.estimate) / root[rows])[:, None])
+        standings = (at.standings or at.visits).of(rows)
+        pulls = standings.products(X, part.applied((z - Q @ state.estimate) / root[rows])[:, None])
         squares += float(np.sum(pulls**2))
-        for _, alike in part.visits.alike:
+        for _, alike in standings.alike:
             few = X[alike]
             few = few if few.shape[1] > few.shape[2] else np.swapaxes(few, 1, 2)
             gram = np.swapaxes(few, 1, 2) @ few

@@ -29,6 +29,8 @@ _BESIDE: Final = (
     "truths",
     "history",
 )
+#: How a calibration ends that nothing speaks against.
+_SOUND: Final = "converged"
 
 
 def sealed(robot: Robot, proof: Proof) -> Robot:
@@ -47,6 +49,12 @@ def arm_is_known(robot: Robot) -> bool:
     if robot.proof is None or not is_intact(robot):
         return False
     return any(robot.parameters[name].group not in PLACES for name in robot.proof.names)
+
+
+def calibrated_soundly(robot: Robot) -> bool:
+    """Return whether a robot has the arm of an earlier calibration that nothing spoke against."""
+    proof = robot.proof
+    return proof is not None and proof.status == _SOUND and not proof.errors and arm_is_known(robot)
 
 
 def _digest(robot: Robot) -> str:

@@ -2,7 +2,7 @@
 
 Twenty robots are drawn from their priors, with joints that give way and repeat as arms do. A tracker reads three
 reflectors, markers are read as a pose, or four strings read distances; 10 to 300 configurations, with a load that is
-told or without. Each campaign goes through `check` and `calibrate` as they are by default. Small ones of every fifth
+told or without. Each campaign goes through `check` and `calibrate` as they are by default. Small ones of every tenth
 robot also have each fault, one at a time. Arguments: campaigns (1000), and the first (0). Two processes. Writes
 benchmarks/clean_campaigns.json.
 """
@@ -46,7 +46,7 @@ INSTRUMENTS: Final = ("tracker", "markers", "strings")
 FEWEST: Final = {"tracker": 10, "markers": 15, "strings": 25}
 #: Joint repeatability [deg], of the best arms to fair ones.
 REPEATABILITY: Final = (0.0003, 0.002)
-FAULTY: Final = 5
+FAULTY: Final = 10
 SMALL: Final = 60
 TRACKER_NOISE: Final = 2e-5
 

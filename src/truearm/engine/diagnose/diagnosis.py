@@ -30,7 +30,7 @@ from truearm.engine.diagnose.visits import (
     joints_as_far_off,
 )
 from truearm.engine.fit.transmission import check_transmission
-from truearm.engine.robot.effects.compliance import Compliance
+from truearm.engine.robot.loads import has_weight
 
 # Is what a fit leaves more than joints miss by, where no deviation is declared that would say so.
 #
@@ -40,7 +40,7 @@ from truearm.engine.robot.effects.compliance import Compliance
 # miss by 0.001 and 0.007 deg.
 
 #: Errors of every joint, as the readings are left off, from which something else than repeatability is looked for.
-#: A model whose joints do not give way leaves as much again: loads turn joints by some hundredths of a degree.
+#: Where nobody knows the loads as much again is left: they turn joints by some hundredths of a degree.
 _LARGEST: Final = math.radians(0.02)
 _LARGEST_RIGID: Final = math.radians(0.04)
 
@@ -63,8 +63,7 @@ def check_residual(left: LeftOver) -> list[Notice]:
     if "geometry" not in fit.model.groups or any(block.declared for block in left.problem.blocks):
         return []
     seeming = joints_as_far_off(left)
-    bends = fit.model.weighed or Compliance.name in fit.model.effects
-    if seeming <= (_LARGEST if bends else _LARGEST_RIGID):
+    if seeming <= (_LARGEST if fit.model.weighed or has_weight(fit.robot) else _LARGEST_RIGID):
         return []
     off, more = math.degrees(seeming), "" if fit.model.weighed else " (try `model=auto`)"
     return [

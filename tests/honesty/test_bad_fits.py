@@ -94,7 +94,7 @@ def test_where_every_row_has_them_nothing_is_wrong(tmp_path: Path) -> None:
     for number, data in enumerate((large_arm(3), swapped(large_arm(3), 1.0), large_arm(2))):
         file = written(tmp_path, data, f"{number}.csv")
         found = told("calibrate", "kr210_r2700", file, "--out", tmp_path / "out")
-        assert (found.code, found.levels) == (0, {"urdf-partial": "note"})  # no fault: every effect is in the model
+        assert (found.code, found.levels) == (0, {})  # no fault: every effect is in the model
         assert found.summary["validation"]["position_mm"]["mean"] < 0.1
 
 
@@ -125,7 +125,7 @@ def test_the_same_readings_without_entry_errors_or_with_a_robust_loss_are_not(tm
         assert (found.code, found.levels["no-gain"]) == (0, "warning")
         assert "worse-than-nominal" not in found.levels
     gained = told("calibrate", "irb120", written(tmp_path, small_arm()), "--out", tmp_path / "out")
-    assert (gained.code, gained.levels) == (0, {"urdf-partial": "note"})
+    assert (gained.code, gained.levels) == (0, {})
 
 
 # -- what a bad fit replaces -----------------------------------------------------------------------------------

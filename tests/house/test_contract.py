@@ -142,7 +142,7 @@ def test_every_model(truearm: Truearm, small: Path, tmp_path: Path) -> None:
         assert run.code == 0, (model, redundancy, run.err)
         codes = {w["code"] for w in json.loads(run.out)["warnings"]}
         assert ("redundant" in codes) == (redundancy == "drop"), (model, redundancy)
-        assert ("urdf-partial" in codes) == (model == "joints"), (model, redundancy)
+        assert ("not_in_urdf" in json.loads(run.out)) == (model == "joints"), (model, redundancy)
         names = {row["name"] for row in json.loads((tmp_path / "result.json").read_text())["parameters"]}
         assert ("gain_1" in names) == (model == "joints"), (model, redundancy)
 

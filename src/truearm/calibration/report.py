@@ -197,7 +197,7 @@ def report_html(calibration: Calibration) -> str:
             *_curves(run, drawn),
             *_zones(run, drawn),
             *_shares(run, drawn),
-            _parameters(fit),
+            _parameters(run),
             *_monte_carlo(run, drawn),
             _correlations(fit, drawn),
             Section("Noise", [noise_table(fit), Words(noise_sentence(fit))], "noise"),
@@ -459,7 +459,8 @@ def _shares(run: Calibration, drawn: dict[str, Figure]) -> list[Section]:
     return [Section("What every effect does", blocks, "choice")]
 
 
-def _parameters(fit: Fit) -> Section:
+def _parameters(run: Calibration) -> Section:
+    fit = run.fit
     rows = parameter_rows(fit)
     own, frames = ([row for row in rows if (row.group in _FRAMES) is of_frames] for of_frames in (False, True))
     idle, own = ([row for row in own if untold(fit, row) is so] for so in (True, False))
@@ -469,6 +470,8 @@ def _parameters(fit: Fit) -> Section:
         "Click a heading to sort."
     )
     blocks: list[Block] = [Words(words)]
+    if run.not_in_urdf:
+        blocks.append(Words(run.urdf_words, quiet=True))
     if fit.redundancies:
         combined = (
             "Moving the parameters together along these directions hardly changes any predicted reading, so the first "

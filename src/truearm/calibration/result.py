@@ -211,6 +211,8 @@ class Calibration(Record):
             yield replace(leaf, in_json={})
         if unseen is not None:
             yield least_block(unseen, self.least)
+        if self.not_in_urdf:
+            yield detail(self.urdf_words, not_in_urdf=self.not_in_urdf)
         if self.notes:
             yield say(notes=self.notes)
 
@@ -318,6 +320,28 @@ class Calibration(Record):
         """Names of the files that are written: those of every calibration, and of the zones that are kept."""
         zone_names = [] if self.zones is None else [robot_file_of(verdict.box.name) for verdict in self.zones.kept]
         return (*RESULT_FILES, *([ZONES_FILE] if zone_names else []), *zone_names)
+
+    @property
+    def not_in_urdf(self) -> list[str]:
+        """Names of the joint effects that ``calibrated.urdf`` lacks: geometry and joint zeros are all that it holds."""
+        fit = self.fit
+
+        def is_told(names: list[str]) -> bool:
+            return any(name in fit.free.names and fit.parameter_status(name) != "uninformed" for name in names)
+
+        effects = [(effect.name, [p.name for p in effect.parameters]) for effect in fit.robot.effects]
+        return [name for name, parameters in effects if not fit.model.weighed or is_told(parameters)]
+
+    @property
+    def urdf_words(self) -> str:
+        """What the URDF lacks, in words."""
+        holds = "calibrated.urdf holds the geometry and the joint zeros, calibrated.yaml everything."
+        return f"{holds} Not in the URDF: {', '.join(self.not_in_urdf)}."
+
+    def written_at(self, out: str) -> str:
+        """Return the line that says which files hold it."""
+        lacks = " (the URDF without joint effects)" if self.not_in_urdf else ""
+        return f"{super().written_at(out)}{lacks}"
 
     def zone_robot(self, verdict: ZoneVerdict) -> Robot:
         """Return the calibrated robot of a zone, with what is known about it.

@@ -13,7 +13,6 @@ from truearm.engine.diagnose.unmodelled import PULLED_AWAY, WRONG_DATA
 from truearm.engine.fit.fit import Fit, Status
 from truearm.engine.robot.conventions.convention import parallel_joints_without_beta
 from truearm.engine.robot.effects import EFFECTS, NON_NEGATIVE
-from truearm.engine.robot.effects.effect import Effect
 from truearm.engine.robot.effects.joint_curve import JointCurve
 from truearm.engine.robot.loads import has_weight
 
@@ -55,7 +54,6 @@ RESIDUALS_EXCEED_SIGMA: Final = Rule(
     "the robot does more than the model, or sigma is too small; a note where the next steps say what explains it",
     unless=OF_CHANGES | {PULLED_AWAY, WRONG_DATA},
 )
-URDF_PARTIAL: Final = Rule("urdf-partial", "note", "what the URDF could not hold")
 
 
 def check_fit(fit: Fit, expected: ExpectedError, *, explained: bool = False) -> list[Notice]:
@@ -127,17 +125,6 @@ def check_fit(fit: Fit, expected: ExpectedError, *, explained: bool = False) -> 
             )
         )
     notices += _check_effects(fit)
-    told = [effect for effect in fit.robot.effects if not fit.model.weighed or _is_told(fit, effect)]
-    if told:
-        own = [p.name for effect in told for p in effect.parameters]
-        notices.append(
-            URDF_PARTIAL(
-                "calibrated.urdf holds the geometry and the joint zeros only. A URDF cannot hold "
-                f"{', '.join(effect.name for effect in told)} "
-                f"({', '.join(own[:6])}{', ..' if len(own) > 6 else ''}), nor the base "
-                "and the targets in the instrument's frame. calibrated.yaml holds everything."
-            )
-        )
     return notices
 
 
@@ -229,11 +216,6 @@ NEGATIVE_EFFECT: Final = Rule(
 EFFECTS_UNINFORMED: Final = Rule(
     "effects-uninformed", "warning", "parameters of joint effects that the data do not inform, by name", gravity=0
 )
-
-
-def _is_told(fit: Fit, effect: Effect) -> bool:
-    free = [p.name for p in effect.parameters if p.name in fit.free.names]
-    return any(fit.parameter_status(name) != "uninformed" for name in free)
 
 
 def _check_effects(fit: Fit) -> list[Notice]:

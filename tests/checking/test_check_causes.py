@@ -69,7 +69,9 @@ def of_another_robot(_: Dataset) -> Dataset:
 
 WRONG = [
     pytest.param(noise, "rows-unrelated", "in an order drawn at random", id="noise"),
-    pytest.param(scaled(2.0), "unit-length", "times too large for this robot", id="twice as large"),
+    pytest.param(
+        scaled(2.0), "wrong-robot", "All its lengths come out 2 times as long, by one factor", id="twice as large"
+    ),
     pytest.param(scaled(1e4), "unit-length", "times too large for this robot", id="ten thousand times"),
     pytest.param(scaled(1e3), "unit-length", "as if mm were called m", id="mm called m"),
     pytest.param(scaled(1e-3), "unit-length", "as if m were called mm", id="m called mm"),
@@ -214,7 +216,7 @@ def test_joint_positions_of_another_row_are_told() -> None:
     joints = data.joints.copy()
     joints[[4, 9]] = joints[[9, 4]]
     (notice,) = check(ROBOT, replace(data, joints=joints)).warnings
-    assert notice.code == "joints-mistaken"
+    assert notice.code == "rows-shifted"
     assert "5 (those of 10), 10 (those of 5)" in notice.message
     joints = data.joints.copy()
     joints[4] = joints[9]

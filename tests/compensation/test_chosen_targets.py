@@ -89,6 +89,16 @@ def test_taught_points_stay_byte_for_byte(tmp_path: Path) -> None:
     assert "nothing-corrected" not in codes(again)
 
 
+def test_a_tool_that_is_given_is_not_called_missing_where_all_points_were_taught(tmp_path: Path) -> None:
+    alone = tmp_path / "alone.mod"
+    alone.write_text("\n".join(line for line in plate(tmp_path).read_text().splitlines() if "Offs" not in line))
+    tools = cell(tmp_path, "tools:\n  tProbe: {of: flange, translation: [50, 25, 180]}\n")
+    given, absent = (compensate(worn(), [alone], taught=["points"], tools=file) for file in (tools, None))
+    assert given.files[0].corrected == absent.files[0].corrected == 0
+    assert "are where `tools` places them" in given.frame_words[-1]
+    assert "No tool has a measured place" in absent.frame_words[-1]
+
+
 def test_an_offset_from_a_point_that_stays_is_as_long_as_it_says(tmp_path: Path) -> None:
     """The real robot is asked where it is at the point, and 150 mm beside it."""
     for offset in ("Offs(p1,120,-80,60)", "RelTool(p1,120,80,-60)"):
@@ -305,8 +315,16 @@ def test_a_position_of_fanuc_is_named_with_or_without_its_comment() -> None:
         for position in ("P[1]", 'P[2:"seam"]')
     )
     target = FANUC_LS.read([Source(Path("a.ls"), f"{text}/END\n")])
-    for name in ("P[2]", "P[2:seam]", "P[2*"):
-        assert [Patterns([target], [name], "keep").fit(position.name) for position in target.targets] == [
-            False,
-            True,
-        ], name
+    for name, meant in (
+        ("P[2]", [False, True]),
+        ("P[2:seam]", [False, True]),
+        ('P[2:"seam"]', [False, True]),
+        ("P[2*", [False, True]),
+        ("P[1]", [True, False]),
+        ("P[1:start]", [True, False]),  # instructions and positions write the comment, or do not
+    ):
+        fits = Patterns([target], [name], "keep").fit
+        assert [fits(position.name) for position in target.targets] == meant, name
+    for other in ("P[2:start]", "PR[2]", "P[3]"):
+        with pytest.raises(InputError, match="no target of the programs has this name"):
+            Patterns([target], [other], "keep")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
 from tests.answered import ANSWERS
 from tests.honesty.telling import Told, told, written
-from tests.lookalikes import campaign_of
+from tests.lookalikes import campaign_of, sized
 from tests.plate import PLATE
 
 from truearm.engine.robot.library import load_robot
@@ -44,6 +45,41 @@ def test_the_check_tells_it_before_anything_is_fitted(folder: Path) -> None:
     assert found.code == 3
     assert found.says("wrong-robot", "error", "ur10e of the library")
     assert told("check", "ur10e", folder / "data.csv").code == 0
+
+
+@pytest.mark.parametrize(("times", "off"), [(1.278, "[+]9"), (0.75, "-8")])
+def test_an_arm_of_the_family_that_is_in_no_library_is_no_unit(times: float, off: str, tmp_path: Path) -> None:
+    """Both parts of its arm are longer, or shorter: the readings fit when they are scaled, by no unit's factor."""
+    longer = sized("irb1200_7_0.7", "longer", a_3=350.0 * times, d_4=351.0 * times)
+    file = written(tmp_path, campaign_of(longer, 30, 3)[1])
+    for words in (("check",), ("calibrate", "--model=geometric", "--out", tmp_path / "out")):
+        found = told(words[0], "irb1200_7_0.7", file, *words[1:])
+        assert found.says("wrong-robot", "error", rf"by its lengths: .*a_3 by {off}[0-9.]+ mm"), found
+        assert "wider priors" not in found.messages["wrong-robot"]
+        assert "unit-length" not in found.levels
+
+
+def test_an_instrument_whose_scale_is_wrong_may_be_the_cause(tmp_path: Path) -> None:
+    data = campaign_of(load_robot("irb1200_7_0.7"), 30, 3)[1]
+    for times, code, words in (
+        (
+            1.278,
+            "wrong-robot",
+            r"All its lengths come out 1\.28 times as long, by one factor: .*the scale of the instrument",
+        ),
+        (10.0, "unit-length", "too large for this robot"),
+    ):
+        file = written(tmp_path, replace(data, position=data.position * times))
+        assert told("check", "irb1200_7_0.7", file).says(code, "error", words)
+    assert not told("check", "irb1200_7_0.7", written(tmp_path, data)).levels
+
+
+def test_an_arm_of_another_maker_is_not_unrelated_rows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("truearm.engine.diagnose.wrong_robot.library", lambda: ("irb120", "ur5e"))
+    for measured, given in (("puma560", "irb120"), ("xarm6", "ur5e")):
+        found = told("check", given, written(tmp_path, campaign_of(load_robot(measured), 30, 3)[1]))
+        assert found.says("implausible", "error"), found
+        assert "rows-unrelated" not in found.levels
 
 
 def test_no_program_is_corrected_with_it_until_it_is_accepted(folder: Path) -> None:

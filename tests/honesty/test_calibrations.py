@@ -21,6 +21,7 @@ from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import errors_of
 from truearm.engine.fit.fit import identify
 from truearm.engine.fit.models import named_model
+from truearm.engine.robot import library
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.library import load_robot
 from truearm.engine.robot.parts import Payload
@@ -113,6 +114,24 @@ def test_a_payload_in_grams(folder: Path) -> None:
             "--model=geometric",
         )
         assert found.says("payload-unlikely", "warning", "grams called kilograms") is said, found
+
+
+def test_a_payload_above_the_rated_load(folder: Path) -> None:
+    file = written(folder, made(None)[1])
+    unrated = folder / "unrated.yaml"
+    text = (Path(library.__file__).parent / "irb120.yaml").read_text()
+    unrated.write_text(re.sub(r"(?m)^rated_load.*\n", "", text))
+    assert unrated.read_text() != text
+    for robot, mass, said in (
+        ("irb120", 3.0, False),
+        ("irb120", 3.1, True),
+        ("irb120", 6.0, True),
+        (unrated, 6.0, False),
+    ):
+        payload = f"{mass}kg,0mm,0mm,100mm"
+        found = told("calibrate", robot, file, "--payload", payload, "--out", folder / "heavy", "--model=geometric")
+        assert found.says("rated-load-exceeded", "warning", "irb120 is rated for 3 kg") is said, found
+        assert "payload-unlikely" not in found.levels
 
 
 def test_another_robot_is_not_this_one(folder: Path) -> None:

@@ -98,6 +98,22 @@ def stuck(p: Array, data: Dataset) -> Array:
     return p
 
 
+def from_the_ground(q: Array) -> Array:
+    """Count joint 3 from the ground, as pendants of FANUC do."""
+    return np.asarray(q - q[:, 1:2] * np.eye(6)[2])
+
+
+def exchanged(q: Array) -> Array:
+    """Exchange the rows of two configurations, and of two others."""
+    q[[4, 9, 16, 17]] = q[[9, 4, 17, 16]]
+    return q
+
+
+def shifted_in_part(q: Array) -> Array:
+    q[10:16] = np.roll(q[10:16], 1, axis=0)
+    return q
+
+
 def pasted_joints(q: Array) -> Array:
     q[10:15] = q[:5]
     return q
@@ -114,6 +130,16 @@ def names_exchanged(data: Dataset) -> Dataset:
     """Exchange the names of two targets in the second half."""
     mixed = np.where(late(data)[:, 0] > 0, np.array([1, 0, 2])[data.target], data.target)
     return replace(data, target=np.asarray(mixed, dtype=np.intp))
+
+
+def names_exchanged_at(*configurations: int) -> Change:
+    """Exchange the names of two targets at some configurations."""
+
+    def change(data: Dataset) -> Dataset:
+        there = np.isin(data.configuration, configurations)
+        return replace(data, target=np.where(there, np.array([1, 0, 2])[data.target], data.target).astype(np.intp))
+
+    return change
 
 
 def renamed_in_half(name: str, other: str) -> Change:
@@ -269,7 +295,50 @@ LIES: Final[dict[str, Lie]] = {
         with_joints(lambda q: q * [1, 1, 1, 1, 1, -1]), "check", "joint-sign", "error", "joint 6", 3
     ),
     "joint-3-counted-from-joint-2": Lie(
-        with_joints(lambda q: q + q[:, 1:2] * np.eye(6)[2]), "check", "implausible", "error", "", 3
+        with_joints(lambda q: q + q[:, 1:2] * np.eye(6)[2]), "check", "joint-sign", "error", r"joint 3 - joint 2 ", 3
+    ),
+    "zero-of-joint-2-off-by-a-quarter": Lie(
+        with_joints(lambda q: q + np.radians(90.0) * np.eye(6)[1]),
+        "check",
+        "joint-sign",
+        "error",
+        "joint 2 - 90 deg ",
+        3,
+    ),
+    "zero-of-joint-4-off-by-a-half": Lie(
+        with_joints(lambda q: q + np.radians(180.0) * np.eye(6)[3]), "check", "joint-sign", "error", "joint 4 - 180 ", 3
+    ),
+    "zero-of-joint-3-and-sign-of-joint-2": Lie(
+        with_joints(lambda q: q * [1, -1, 1, 1, 1, 1] - np.radians(90.0) * np.eye(6)[2]),
+        "check",
+        "joint-sign",
+        "error",
+        r"with -joint 2 instead of joint 2 and joint 3 \+ 90 deg instead of joint 3",
+        3,
+    ),
+    "joint-3-from-the-ground-and-a-target-in-metres": Lie(
+        one_after_the_other(with_joints(from_the_ground), of_one_target(1e-3)),
+        "check",
+        "joint-sign",
+        "error",
+        r"joint 3 \+ joint 2 ",
+        3,
+    ),
+    "a-target-in-metres-and-joint-3-from-the-ground": Lie(
+        one_after_the_other(with_joints(from_the_ground), of_one_target(1e-3)),
+        "check",
+        "unit-length",
+        "error",
+        "Target 2: .* as if m were called mm",
+        3,
+    ),
+    "three-zeros-off": Lie(
+        with_joints(lambda q: q + np.radians([0.0, 90.0, 90.0, 0.0, 90.0, 0.0])),
+        "check",
+        "implausible",
+        "error",
+        "signs, zeros and targets",
+        3,
     ),
     # names
     "half-of-the-rows-in-another-spelling": Lie(
@@ -281,6 +350,24 @@ LIES: Final[dict[str, Lie]] = {
     # rows
     "joints-shifted-by-a-row": Lie(
         with_joints(lambda q: np.roll(q, 1, axis=0)), "check", "rows-shifted", "error", "", 3
+    ),
+    "two-pairs-of-rows-exchanged": Lie(
+        with_joints(exchanged),
+        "check",
+        "rows-shifted",
+        "warning",
+        r"5 \(those of 10\), .*: put the joint positions back",
+    ),
+    "two-pairs-of-rows-exchanged-and-used": Lie(
+        one_after_the_other(without_sigma, with_joints(exchanged)),
+        "calibrate",
+        "rows-shifted",
+        "error",
+        "put .* back",
+        3,
+    ),
+    "block-of-joints-shifted": Lie(
+        with_joints(shifted_in_part), "check", "rows-shifted", "warning", r"11 \(those of 12\).*16 \(those of 11\)"
     ),
     "joints-sorted": Lie(with_joints(lambda q: q[np.argsort(q[:, 0])]), "check", "rows-unrelated", "error", "", 3),
     "joints-of-a-moment-before": Lie(with_joints(lagging), "calibrate", "joints-not-settled", "warning", "", 3),
@@ -356,6 +443,44 @@ def test_the_default_tells_it_too(lie: str, tmp_path: Path) -> None:
     case = LIES[lie]
     found = told("calibrate", "irb120", written(tmp_path, case.change(honest()[1])), "--out", tmp_path)
     assert found.says(case.code, case.level, case.words), found
+
+
+MENDED: Final = {
+    "names-exchanged": (names_exchanged_at(4, 9, 17), "targets-swapped"),
+    "rows-exchanged": (with_joints(exchanged), "rows-shifted"),
+}
+
+
+@pytest.mark.parametrize("lie", MENDED)
+def test_what_can_be_put_right_is_not_to_be_measured_again(lie: str, tmp_path: Path) -> None:
+    change, code = MENDED[lie]
+    checked = said("check", change, tmp_path)
+    assert [*checked.levels] == [code]
+    (step,) = checked.summary["next"]
+    assert (step["code"], code in step["message"]) == ("see-warning", True)
+    calibrated = said("calibrate", change, tmp_path)
+    (step,) = calibrated.summary["next"]
+    assert (step["code"], code in step["message"]) == ("fix-data", True)
+    if "implausible" in calibrated.levels:
+        assert f"The cause is most likely what {code} says" in calibrated.messages["implausible"]
+
+
+def test_beside_them_what_is_wrong_is_measured_again(tmp_path: Path) -> None:
+    """A wrong sign in a row: what the exchanged rows gain is not promised of measuring that one again."""
+    data = campaign("irb120", 40, NOISE, 3)[1]
+    joints = data.joints.copy()
+    joints[[23, 24]] = joints[[24, 23]]
+    joints[16, 3] *= -1
+    found = told("check", "irb120", written(tmp_path, replace(data, joints=joints)))
+    put_right, again = found.summary["next"][:2]
+    assert (put_right["code"], "rows-shifted" in put_right["message"]) == ("see-warning", True)
+    assert (again["code"], again["gain_mm"]) == ("measure-again", None)
+    assert again["message"].endswith("the sign of joint 4 of configuration 17 looks wrong.")
+
+
+def test_wrong_zeros_are_not_unrelated_rows(tmp_path: Path) -> None:
+    found = said("check", LIES["three-zeros-off"].change, tmp_path)
+    assert not {"rows-unrelated", "wrong-robot"} & found.levels.keys(), found
 
 
 @pytest.fixture(scope="module")

@@ -64,6 +64,7 @@ def test_a_folder_has_the_plan_its_ways_the_sheet_and_the_program(planned: Plan,
 def test_a_plan_tells_of_its_program(planned: Plan) -> None:
     lines = "\n".join(planned.lines())
     assert "Measuring program in RAPID: 10 configurations from Home and back, each approached from one side." in lines
+    assert "In the data the column order counts these stops, too: 2, 4, 6 and so on." in lines
     speeds = "250, 250, 250, 320, 320, 420 deg/s"
     assert f"At most 250 mm/s and 10 % of the joints' speed ({speeds}); it stands for 2 s, then until" in lines
     assert "It tells the controller of target 2 at (75, 93.7, 215) mm and of 1.5 kg at (0, 0, 60) mm." in lines

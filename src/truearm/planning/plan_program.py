@@ -261,6 +261,11 @@ class PlanProgram:
             order=[stop.label for stop in measured],
             approached=approached,
         )
+        if approached:
+            yield say(
+                "In the data the column order counts these stops, too: 2, 4, 6 and so on. With configurations numbered "
+                "1, 2, 3 every direction of approach would be wrong."
+            )
         waits = _WAITS[driving.wait].format(driving.input, number(driving.longest, 2))
         share = 100.0 * driving.share
         yield detail(

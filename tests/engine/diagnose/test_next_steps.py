@@ -195,7 +195,11 @@ def test_payloads_that_no_arm_carries_are_doubted() -> None:
         (notice,) = check_payload(robot.with_payload(payload))
         assert (notice.code, notice.level) == ("payload-unlikely", "warning")
         assert words in notice.message
-    for robot, payload in ((irb120, Payload(3.3, (0.1, 0.0, 0.3))), (katana, Payload(0.5, (0.0, 0.0, 0.1)))):
+    for mass in (3.1, 6.0):
+        (notice,) = check_payload(irb120.with_payload(Payload(mass, (0.1, 0.0, 0.3))))
+        assert (notice.code, notice.level) == ("rated-load-exceeded", "warning")
+        assert f"The payload is {mass:g} kg, and irb120 is rated for 3 kg." in notice.message
+    for robot, payload in ((irb120, Payload(3.0, (0.1, 0.0, 0.3))), (katana, Payload(0.5, (0.0, 0.0, 0.1)))):
         assert check_payload(robot.with_payload(payload)) == []
 
 

@@ -15,6 +15,7 @@ from truearm.engine.data.rigid_tool import OUTLIERS, TARGET_MISTAKEN, TARGETS_SW
 from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import JOINTS_REPEATED
 from truearm.engine.diagnose.changes import Change, notices_of_change, what_moved
+from truearm.engine.diagnose.entry_error_trials import ROWS_SHIFTED
 from truearm.engine.diagnose.expected_error import ExpectedError, expected_error, moved_by_order
 from truearm.engine.diagnose.far_off import PULLING
 from truearm.engine.diagnose.narrow_data import FEW_READINGS, check_few_readings
@@ -36,10 +37,10 @@ from truearm.engine.robot.effects.compliance import Compliance
 
 #: Readings that pull a fit, and single ones that are far off: what is left is not the robot's.
 _DOUBTING: Final = PULLING | {OUTLIERS.code}
-#: Readings under the name of another point. A fit that they pull must not be used, and their names can be put right.
-_MISNAMED: Final = frozenset({TARGETS_SWAPPED.code, TARGET_MISTAKEN.code})
+#: Readings under the name of another point or row. A fit that they pull must not be used, and they can be put right.
+MISNAMED: Final = frozenset({TARGETS_SWAPPED.code, TARGET_MISTAKEN.code, ROWS_SHIFTED.code})
 #: All readings that may pull a fit, whatever is wrong with them.
-DOUBTED: Final = _DOUBTING | _MISNAMED | {JOINTS_REPEATED.code}
+DOUBTED: Final = _DOUBTING | MISNAMED | {JOINTS_REPEATED.code}
 #: Losses with which a fit is pulled.
 PULLED: Final = frozenset({"linear", "huber"})
 
@@ -108,7 +109,7 @@ class Case:
         knows itself. Of its lengths the robust fit knows more where this one was pulled away, or had none to choose.
         """
         return [
-            replace(notice, level="error") if notice.code in _MISNAMED and self.fit.loss in PULLED else notice
+            replace(notice, level="error") if notice.code in MISNAMED and self.fit.loss in PULLED else notice
             for notice in self.noticed
             if notice.code not in (IMPLAUSIBLE.code, FEW_READINGS.code, WRONG_ROBOT.code)
         ]
@@ -120,8 +121,8 @@ class Case:
         other = check_robot(self.fit, self.training) if judges_lengths(self.fit) and not self.biased else noticed
         if has_error([*self.of_data, *self.changes]):  # what is wrong with the data bends the robot too
             other = []
-        unlike = check_plausible(self.fit, self.training, (*self.of_data, *other, *noticed))
-        return [*unlike, *(other or noticed)] if unlike else other
+        unlike = check_plausible(self.fit, self.training, [n.code for n in (*self.of_data, *other, *noticed)])
+        return [*(other or noticed), *unlike] if unlike else other
 
     @property
     def implausible(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations, permutations, product
 from typing import Final
 
 import numpy as np
@@ -34,6 +34,9 @@ _SQUARE: Final = 0.1
 _MOST_NAMED: Final = 5
 #: No joint turns farther to one side, in turns.
 _MOST_TURNS: Final = 1.5
+#: Units that lengths are given in [m], and how far a factor found by the nominal robot may be from that of two of them.
+_LENGTHS: Final = (1e-6, 1e-3, 1e-2, 1.0, 0.0254, 0.3048)
+_SAME_FACTOR: Final = 0.02
 
 
 UNIT_ANGLE: Final = Rule(
@@ -57,9 +60,15 @@ JOINTS_OF_MODEL: Final = Rule(
 JOINT_SIGN: Final = Rule(
     "joint-sign",
     "error",
-    "joint positions that fit with the opposite sign of up to three joints, or with two columns exchanged",
+    "joint positions that fit with the opposite sign of up to three joints, with one or two counted otherwise (a zero "
+    "that is 90 or 180 deg off, joint 3 from joint 2 or from the ground), or with two columns exchanged",
 )
-ROWS_SHIFTED: Final = Rule("rows-shifted", "error", "joint positions that fit one row earlier or later")
+ROWS_SHIFTED: Final = Rule(
+    "rows-shifted",
+    ("error", "warning"),
+    "joint positions that fit one row earlier or later; or, at some configurations, that were exchanged among these: a "
+    "warning, and an error where they pull the fit, with the losses `linear` and `huber`",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +115,7 @@ def scale_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
     """Try the factor by which readings are larger than the robot, from the linear map that takes them onto it.
 
     Of ``B y = R_c t + p_c + u`` the map B, the targets t and u are found by least squares. Where B stretches all axes
-    alike, its inverse is a turn times the factor.
+    alike, its inverse is a turn times the factor. A factor between no two units is that of another robot.
     """
     p, R = robot.with_frames(Transform(), {}).world_poses(data.postures)
     readings = np.flatnonzero(data.has_position)
@@ -132,6 +141,8 @@ def scale_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
         yield from _column_entry_errors(data, onto)
         return
     factor = float(np.prod(stretch)) ** (1 / 3)
+    if all(abs(factor * a / b - 1.0) > _SAME_FACTOR for a, b in permutations(_LENGTHS, 2)):
+        return
     size = f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
     yield EntryError(
         UNIT_LENGTH, f"The positions are {size} for this robot. Fix them or their unit", _scaled(data, factor)
@@ -246,6 +257,44 @@ def sign_entry_errors(data: Dataset, size: int = 1) -> Iterator[EntryError]:
         yield EntryError(
             JOINT_SIGN, words + "Change it in the data, or correct the robot file", replace(data, joints=joints)
         )
+
+
+def count_entry_errors(data: Dataset, size: int = 1) -> Iterator[EntryError]:
+    """Try so many joints at once that are counted otherwise: another zero, from the ground, or the other way round.
+
+    What :func:`sign_entry_errors` tries is left out.
+    """
+    for group in combinations(list(_other_counts(data)), size):
+        places = [i for i, _, _ in group]
+        if len({*places}) < size or all(how == f"-joint {i + 1}" for i, _, how in group):
+            continue
+        joints = data.joints.copy()
+        for i, positions, _ in group:
+            joints[:, i] = positions
+        subject = f"Joint {places[0] + 1} is" if size == 1 else f"Joints {' and '.join(str(i + 1) for i in places)} are"
+        instead = " and ".join(f"{how} instead of joint {i + 1}" for i, _, how in group)
+        words = f"{subject} counted otherwise than in the robot file: the data fit with {instead}. "
+        words += "Change that in the data, or correct the robot file"
+        yield EntryError(JOINT_SIGN, words, replace(data, joints=joints))
+
+
+def _other_counts(data: Dataset) -> Iterator[tuple[int, Array, str]]:
+    """Return ways to count joints otherwise: which joint from 0, its positions, and how in words.
+
+    The zeros of the first and of the last joint are no more than turns of the base and of the targets.
+    """
+    turning, last = _turning(data), data.joints.shape[1] - 1
+    for i in turning:
+        for sign, quarters in product((1.0, -1.0), (0, 1, -1, 2, -2)):
+            if (quarters and i in (0, last)) or (sign > 0.0 and not quarters):
+                continue
+            zero = "" if not quarters else f" {'+' if quarters > 0 else '-'} {abs(quarters) * 90} deg"
+            how = f"{'-' if sign < 0.0 else ''}joint {i + 1}{zero}"
+            yield i, sign * data.joints[:, i] + quarters * math.pi / 2, how
+    if 1 in turning and 2 in turning:
+        for sign, by in product((1.0, -1.0), repeat=2):
+            how = f"{'-' if sign < 0.0 else ''}joint 3 {'+' if by > 0.0 else '-'} joint 2"
+            yield 2, sign * data.joints[:, 2] + by * data.joints[:, 1], how
 
 
 def order_entry_errors(data: Dataset) -> Iterator[EntryError]:

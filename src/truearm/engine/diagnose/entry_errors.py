@@ -25,6 +25,7 @@ from truearm.engine.diagnose.entry_error_trials import (
     angle_entry_errors,
     as_noted,
     controller_entry_errors,
+    count_entry_errors,
     length_entry_errors,
     mirrored,
     mixed_angle_entry_errors,
@@ -267,6 +268,16 @@ _UNRELATED: Final = 0.3
 #: much better than the best of these data must fit that follow them.
 _ORDERS_DRAWN: Final = 19
 _ALIKE: Final = 0.8
+#: Joints before the wrist, how much those of the wrist count beside them, what is added to the kernel, and how many
+#: orders are drawn, where readings are predicted from each other.
+_OF_ARM: Final = 3
+_OF_WRIST: Final = 0.2
+_RIDGE: Final = 0.1
+_ORDERS_PREDICTED: Final = 99
+#: How many times as far as the flange a target goes at most, or the other way round, and how many times farther from
+#: the middle than half of them readings in one unit lie.
+_ABOUT: Final = 3.0
+_MOST_APART: Final = 8.0
 #: A campaign is at least so large, over what an arm lets it be at most.
 _LEAST_OF_REACH: Final = 0.02
 #: No target is farther from the flange [m].
@@ -276,8 +287,13 @@ _FITTED_NOISE: Final = 1e-4
 
 
 def entry_errors_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
-    """Return which data-entry error explains positions in the instrument's frame; nothing if all or none fit."""
+    """Return which data-entry errors explain positions in the instrument's frame; nothing if all or none fit."""
     data, robot = _few_targets(data), robot.with_frames(Transform(), {})  # made once for all that is tried
+    data, of_targets = _in_one_unit(robot, data)
+    return [*of_targets, *_entry_errors(robot, data)]
+
+
+def _entry_errors(robot: Robot, data: Dataset) -> list[Notice]:
     turned = orientation_entry_errors(robot, _some(data))
     poses = [replace(entry, data=_positions(entry.data)) for entry in pose_entry_errors(_some(data))]
     some, positions = _positions(_some(data)), _positions(data)
@@ -301,7 +317,8 @@ def entry_errors_in_positions(robot: Robot, data: Dataset) -> list[Notice]:
             some,
             [*_simple_entry_errors(robot, positions), *poses],
             lambda: [
-                entry for size in (2, 3) for entry in as_noted(robot, some, partial(sign_entry_errors, size=size))
+                *(entry for size in (2, 3) for entry in as_noted(robot, some, partial(sign_entry_errors, size=size))),
+                *as_noted(robot, some, partial(count_entry_errors, size=2)),
             ],
         )
         if best is not None:
@@ -340,6 +357,7 @@ def _simple_entry_errors(robot: Robot, data: Dataset) -> Iterator[EntryError]:
     yield from controller_entry_errors(robot, some)
     yield from mirrored(some)
     yield from as_noted(robot, some, sign_entry_errors)
+    yield from as_noted(robot, some, count_entry_errors)
     yield from as_noted(robot, some, order_entry_errors)
     yield from (replace(entry, data=_some(entry.data)) for entry in shifted(data))
     yield from scale_entry_errors(robot, some)
@@ -370,8 +388,16 @@ def _best(
         tried += more
         shares += _shares(robot, more)
     least = min(shares)
-    best = next(entry for entry, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least)
-    return best if least * _LEAST_IMPROVEMENT < as_given else None
+    if least * _LEAST_IMPROVEMENT >= as_given:
+        return None
+    good = [entry for entry, share in zip(tried, shares, strict=True) if share <= _AS_GOOD * least]
+    return min(good, key=lambda entry: _beyond_limits(robot, entry.data))  # the first of those alike
+
+
+def _beyond_limits(robot: Robot, data: Dataset) -> int:
+    """Return how many joint positions are beyond the limits, to tell a sign from a zero that explains as much."""
+    low, high = np.array([joint.limits or (-math.inf, math.inf) for joint in robot.joints]).T
+    return int(((data.joints < low) | (data.joints > high)).sum())
 
 
 def _shares(robot: Robot, entries: Sequence[EntryError]) -> list[float]:
@@ -507,7 +533,7 @@ ROWS_UNRELATED: Final = Rule(
 
 
 def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
-    """Say if the readings fit the joints no better than in an order that is drawn."""
+    """Say if the readings fit the joints no better than in an order that is drawn, neither by the robot nor by any."""
     as_given = _misfit(robot, data)
     if as_given < _UNRELATED * _spread(data):
         return []
@@ -517,7 +543,7 @@ def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
             return []  # the robot or the instrument stands elsewhere in the other half
     rng = np.random.default_rng(0)
     drawn = (replace(data, joints=rng.permutation(data.joints)) for _ in range(_ORDERS_DRAWN))
-    if any(_ALIKE * _misfit(robot, other) <= as_given for other in drawn):
+    if any(_ALIKE * _misfit(robot, other) <= as_given for other in drawn) and not _follow(data):
         return [
             ROWS_UNRELATED(
                 "The readings do not follow the joint positions: in an order drawn at random they fit the robot as "
@@ -525,6 +551,58 @@ def _unrelated(robot: Robot, data: Dataset) -> list[Notice]:
             )
         ]
     return []
+
+
+def _follow(data: Dataset) -> bool:
+    """Return whether readings follow the joint positions as those of any arm do, whatever its lengths and zeros.
+
+    Where an arm is, is a sum of products of the sines and cosines of its joints. So each configuration is predicted
+    from the others by kernel ridge regression with a product of cosines, and in no order drawn may they predict as
+    well. The joints of the wrist count less. Of 11 arms of the library with 24 to 60 random configurations each of 220
+    campaigns was seen to follow, with 16 configurations 40 of 55; of those whose rows were shuffled 1 of 220.
+    """
+    read = np.full((data.configurations, len(data.targets), 3), np.nan)
+    read[data.configuration, data.target] = data.position
+    whole = np.flatnonzero(np.isfinite(read).all(axis=(1, 2)))
+    places = read[whole].reshape(len(whole), -1)
+    places = places - places.mean(axis=0)
+    q = data.joints[whole]
+    kernel = np.ones((len(whole), len(whole)))
+    for i, kind in enumerate(data.joint_kinds):
+        along = q[:, i] if kind == "revolute" else math.pi * q[:, i] / max(float(np.ptp(q[:, i])), 1e-12)
+        share = 1.0 if i < _OF_ARM else _OF_WRIST
+        kernel *= (1.0 + share * np.cos(along[:, None] - along)) / (1.0 + share)
+    inverse = np.linalg.inv(kernel + _RIDGE * np.eye(len(whole)))
+
+    def left(places: Array) -> float:
+        """Return the sum of squares of what is left of each place where the others predict it."""
+        return float(np.sum((inverse @ places / inverse.diagonal()[:, None]) ** 2))
+
+    rng = np.random.default_rng(0)
+    return len(whole) > 1 and all(left(rng.permutation(places)) > left(places) for _ in range(_ORDERS_PREDICTED))
+
+
+def _in_one_unit(robot: Robot, data: Dataset) -> tuple[Dataset, list[Notice]]:
+    """Return the data with targets that are in another unit than the others corrected, and the errors about them.
+
+    A target goes about as far as the flange does, whatever else is wrong with the joints.
+    """
+    flange = robot.world_poses(data.postures)[0]
+    size = float(np.sqrt(np.mean(np.var(flange, axis=0))))
+    factor, notices = np.ones(len(data.targets)), list[Notice]()
+    for t, name in enumerate(data.targets):
+        read = data.position[(data.target == t) & data.has_position]
+        away = np.linalg.norm(read - np.median(read, axis=0), axis=1) if len(read) else np.zeros(0)
+        if len(away) < _FEWEST_PLACED or away.max() > _MOST_APART * np.median(away):  # single rows in another unit
+            continue
+        own = float(np.sqrt(np.mean(np.var(read, axis=0)))) / max(size, 1e-12)
+        for by, words in LENGTH_FACTORS:
+            if 1.0 / _ABOUT < by * own < _ABOUT:
+                factor[t] = by
+                notices.append(UNIT_LENGTH(f"Target {name}: The positions are {words}. Fix the unit in the header."))
+    if (factor == factor[0]).all():  # the unit of all, which is tried beside other errors
+        return data, []
+    return replace(data, position=data.position * factor[data.target, None]), notices
 
 
 # -- parts of the data -------------------------------------------------------------------------------------

@@ -38,8 +38,16 @@ PAYLOAD_UNLIKELY: Final = Rule(
 )
 
 
+RATED_LOAD_EXCEEDED: Final = Rule(
+    "rated-load-exceeded", "warning", "the payload, or payload and force together, are more than the rated load"
+)
+
+
 def check_payload(robot: Robot) -> list[Notice]:
-    """Return a notice if the payload is too heavy for an arm like this, or lies beyond its reach."""
+    """Return a notice if the payload is too heavy for this arm or one like it, or lies beyond its reach.
+
+    Where a force acts on the tool, :func:`check_force` holds both against the rated load.
+    """
     mass = robot.payload.mass
     if mass <= 0.0:
         return []
@@ -55,6 +63,8 @@ def check_payload(robot: Robot) -> list[Notice]:
         ]
     rated = robot.rated_load
     most = _MOST * reach**3 if rated is None else _OVERLOAD * rated
+    if rated is not None and rated < mass <= most and robot.wrench is None:
+        return [RATED_LOAD_EXCEEDED(f"The payload is {mass:.4g} kg, and {robot.name} is rated for {rated:g} kg.")]
     if mass <= most:
         return []
     beside = (
@@ -327,9 +337,6 @@ def _turned(arms: Sequence[Robot]) -> list[Notice]:
     ]
 
 
-RATED_LOAD_EXCEEDED: Final = Rule(
-    "rated-load-exceeded", "warning", "payload and force together are more than the rated load"
-)
 RATING_UNKNOWN: Final = Rule(
     "rating-unknown",
     "note",

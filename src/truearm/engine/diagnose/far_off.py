@@ -28,6 +28,7 @@ from truearm.engine.data.statistics import Errors
 from truearm.engine.data.thinning import repeated_joints
 from truearm.engine.diagnose.entry_error_trials import (
     ORIENTATION_ORDER,
+    ROWS_SHIFTED,
     UNIT_ANGLE,
     EntryError,
     angle_entry_errors,
@@ -93,7 +94,8 @@ def far_off(fit: Fit, data: Dataset, off: Array, turned: NDArray[np.bool_]) -> t
             unlike[c] = float(off[rows].max())
         else:
             suspects += of_this
-    return [*scaled, *entries, *_joints_mistaken(data, mistaken, turned_round, unlike)], suspects
+    copied, exchanged = _exchanged(data, mistaken)
+    return [*scaled, *entries, *exchanged, *_joints_mistaken(data, copied, turned_round, unlike)], suspects
 
 
 def _doubted(
@@ -233,11 +235,11 @@ def _joints_mistaken(
     """
     sentences = []
     if others:
-        words = [f"{data.labels[c]} (those of {data.labels[k]})" for c, k in others.items()]
+        words = _of_others(data, others)
         subject = "readings of a configuration fit" if len(words) == 1 else "readings of configurations fit"
         sentences.append(
-            f"The {subject} the joint positions of another one: {listed(words)}. Their rows were exchanged or copied: "
-            "fix the joint positions, or leave them out."
+            f"The {subject} the joint positions of another one: {listed(words)}. Their rows were copied: fix the joint "
+            "positions, or leave them out."
         )
     if signs:
         words = [f"{data.labels[c]} (joint {number})" for c, number in signs.items()]
@@ -256,6 +258,28 @@ def _joints_mistaken(
         )
     at = tuple((data.labels[c], "") for c in (*others, *signs, *unlike))
     return [JOINTS_MISTAKEN(" ".join(sentences), at=at)] if sentences else []
+
+
+def _of_others(data: Dataset, others: dict[int, int]) -> list[str]:
+    return [f"{data.labels[c]} (those of {data.labels[k]})" for c, k in others.items()]
+
+
+def _exchanged(data: Dataset, others: dict[int, int]) -> tuple[dict[int, int], list[Notice]]:
+    """Return configurations that have each other's joint positions, taken out of `others`, and say so."""
+    among = dict(others)
+    while lost := [c for c, k in among.items() if k not in among]:
+        for c in lost:
+            del among[c]
+    if not among:
+        return others, []
+    return {c: k for c, k in others.items() if c not in among}, [
+        ROWS_SHIFTED(
+            f"Configurations have each other's joint positions: {listed(_of_others(data, among))}. Their rows were "
+            "exchanged or shifted: put the joint positions back.",
+            "warning",
+            at=tuple((data.labels[c], "") for c in among),
+        )
+    ]
 
 
 def allowed_off(off: Array) -> float:
@@ -313,7 +337,9 @@ ORIENTATION_OUTLIERS: Final = Rule(
     "[orientations far off](check.md#single-orientations-that-are-off) whose positions are not",
 )
 #: Codes of wrong readings that pull a fit away.
-PULLING: Final = frozenset(rule.code for rule in (ORIENTATION_OUTLIERS, ORIENTATION_ORDER, JOINTS_MISTAKEN, UNIT_ANGLE))
+PULLING: Final = frozenset(
+    rule.code for rule in (ORIENTATION_OUTLIERS, ORIENTATION_ORDER, JOINTS_MISTAKEN, ROWS_SHIFTED, UNIT_ANGLE)
+)
 #: An orientation is doubted if it is at least so far off [rad].
 _LEAST_TURNED: Final = math.radians(0.5)
 #: A joint turns a reading alike if the turn is about its axis but for this share, and hardly moves it if the target is

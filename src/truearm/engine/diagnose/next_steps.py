@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from truearm.engine.base.errors import Notice, counted, listed
 from truearm.engine.data.statistics import Errors
-from truearm.engine.diagnose.case import Case
+from truearm.engine.diagnose.case import MISNAMED, Case
 from truearm.engine.diagnose.changes import Change, is_a_part
 from truearm.engine.diagnose.curves import about_curves, has_curves
 from truearm.engine.diagnose.far_off import ORIENTATION_OUTLIERS
@@ -50,12 +50,18 @@ from truearm.engine.robot.chain import Array
 _NAMED: Final = 3
 
 
-def measured_again(left: LeftOver, off: Off, known: float, *, checked: bool) -> list[NextStep]:
-    """Return the step for configurations that are off one by one."""
+def measured_again(
+    left: LeftOver, off: Off, known: float, noticed: Sequence[Notice], *, checked: bool
+) -> list[NextStep]:
+    """Return the step for configurations that are off one by one, but for those whose names or rows are put right."""
+    named = {label for notice in noticed if notice.code in MISNAMED for label, _ in notice.at}
+    rest = tuple(one for one in off.configurations if left.problem.data.labels[one.index] not in named)
+    gain: float | None = known * (1.0 - off.left)
+    if len(rest) < len(off.configurations):  # what those gain is in it
+        off, gain = replace(off, configurations=rest, in_a_row=False), None
     if not off.configurations:
         return []
     labels = ",".join(left.problem.data.labels[index] for index in sorted(off.indices))
-    gain = known * (1.0 - off.left)
     if off.in_a_row:
         names = [left.problem.data.labels[index] for index in sorted(off.indices)]
         size = math.sqrt(sum(configuration.distance**2 for configuration in off.configurations) / len(names))
@@ -169,6 +175,7 @@ _CURED_FIRST: Final = (
     "reference-moved",
     "targets-swapped",
     "target-mistaken",
+    "rows-shifted",
     "joints-mistaken",
     ORIENTATION_OUTLIERS.code,
     "outliers",
@@ -185,9 +192,7 @@ _CURED_FIRST: Final = (
 #: Those that any other step may explain.
 _EXPLAINED: Final = frozenset({WORSE.code, NO_GAIN.code, "large-residual"})
 #: Those that configurations which are off explain.
-_OF_CONFIGURATIONS: Final = frozenset(
-    {"outliers", "joints-mistaken", "targets-swapped", "target-mistaken", WORSE.code, NO_GAIN.code}
-)
+_OF_CONFIGURATIONS: Final = frozenset({"outliers", "joints-mistaken", WORSE.code, NO_GAIN.code})
 
 
 def steps_after_fit(case: Case, notices: Sequence[Notice]) -> tuple[NextStep, ...]:
@@ -200,7 +205,7 @@ def steps_after_fit(case: Case, notices: Sequence[Notice]) -> tuple[NextStep, ..
     if first:
         return tuple(first)
     left, known = case.left, _known(case.errors)
-    steps, remaining = _of_left_over(left, case.off, case.moved, case.lacking, known, checked=False)
+    steps, remaining = _of_left_over(left, case.off, case.moved, case.lacking, known, notices, checked=False)
     bound = _at_bound(case, remaining)
     spoiled = (
         case.moved is not None
@@ -245,8 +250,11 @@ def steps_after_check(
     if left is not None and errors is not None:
         off = off_configurations(left)
         lacking = explanation(left, off.indices)
-        steps, _ = _of_left_over(left, off, moved, lacking, _known(errors), checked=True)
-    steps += _cures(notices, steps)
+        steps, _ = _of_left_over(left, off, moved, lacking, _known(errors), notices, checked=True)
+    cures = _cures(notices, steps)
+    if any(notice.code in MISNAMED for notice in notices):
+        return (*cures, *most_useful_first(steps))[:MOST]
+    steps += cures
     if any(notice.code == FEW_READINGS.code for notice in notices):
         steps.append(NextStep("measure-more", CURE))
     elif not robot:
@@ -264,6 +272,7 @@ def _of_left_over(
     moved: tuple[LeftOver, Change] | None,
     candidate: Explanation | None,
     known: float,
+    noticed: Sequence[Notice],
     *,
     checked: bool,
 ) -> tuple[list[NextStep], float]:
@@ -282,7 +291,7 @@ def _of_left_over(
         off = still
         known_moved = known * candidate.left
     is_moved = moved is not None and is_a_part(off)
-    steps = [] if is_moved else measured_again(left, off, known * share, checked=checked)
+    steps = [] if is_moved else measured_again(left, off, known * share, noticed, checked=checked)
     remaining = known * off.left
     if moved is not None:
         steps.append(about_change(*moved, known_moved * off.left))

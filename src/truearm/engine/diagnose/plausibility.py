@@ -250,10 +250,10 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
         if entries:
             return Comparison([*(other_robot(robot, data) or entries), *notices])
     wrong = check_robot(fit, data)
-    unlike_robot = check_plausible(fit, data, wrong)
     exchanged = exchanged_names(fit, data)
+    unlike_robot = check_plausible(fit, data, [*(n.code for n in wrong), *(s.rule.code for s in exchanged)])
     if unlike_robot:
-        return Comparison([*unlike_robot, *wrong, *notices], exchanged)
+        return Comparison([*wrong, *unlike_robot, *notices], exchanged)
     doubted = check_few_to_doubt(fit)
     suspects: list[Suspect] = []
     turned = np.zeros(len(off), dtype=bool)
@@ -261,7 +261,8 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
         turned = orientations_off(errors)
         alone = turned & ~(np.nan_to_num(off) > allowed_off(off))
         mistaken, suspects = far_off(fit, data, off, turned)
-        suspects += exchanged
+        known = {label for notice in mistaken for label, _ in notice.at}  # the flange is not turned as it says there
+        suspects += [suspect for suspect in exchanged if suspect.configuration not in known]
         doubted = [*mistaken, *check_orientations(fit, data, errors, alone)]
         often = often_off(data, off)
         if often and not _gives_way(fit, data):

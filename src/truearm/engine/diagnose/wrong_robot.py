@@ -57,6 +57,9 @@ CAUSES: Final = (
     "rows-unrelated",
     "orientation-order",
     "fixtures-unlikely",
+    "targets-swapped",
+    "target-mistaken",
+    "joints-mistaken",
     "wrong-robot",
 )
 
@@ -68,11 +71,7 @@ def implausible(fit: Fit, data: Dataset) -> str | None:
         data: The readings it was made from.
     """
     errors, robot = errors_of(fit.robot, data), fit.robot
-    reach = float(
-        np.linalg.norm(fit.start.with_frames(Transform(), {}).world_poses(data.postures)[0], axis=1).max(initial=0.0)
-    )
-    lengths = np.concatenate([errors.position_norms, errors.length_norms])
-    left = float(np.median(lengths)) if len(lengths) else 0.0
+    left, reach = _left_of_reach(fit, data)
     if left > LARGEST_SHARE_LEFT * reach:
         return (
             f"half of the readings are off by more than {left * 1e3:.3g} mm, {left / reach:.2g} of the "
@@ -106,6 +105,14 @@ def implausible(fit: Fit, data: Dataset) -> str | None:
     return None
 
 
+def _left_of_reach(fit: Fit, data: Dataset) -> tuple[float, float]:
+    """Return by how much half of the readings are off at least, and how far the arm reaches there [m]."""
+    errors = errors_of(fit.robot, data)
+    lengths = np.concatenate([errors.position_norms, errors.length_norms])
+    flange = fit.start.with_frames(Transform(), {}).world_poses(data.postures)[0]
+    return float(np.median(lengths)) if len(lengths) else 0.0, float(np.linalg.norm(flange, axis=1).max(initial=0.0))
+
+
 def _geometry_moved(fit: Fit, data: Dataset) -> float:
     """Return how far the geometry moved, as a root mean square over its free parameters [priors].
 
@@ -132,19 +139,19 @@ IMPLAUSIBLE: Final = Rule(
 )
 
 
-def check_plausible(fit: Fit, data: Dataset, others: Iterable[Notice] = ()) -> list[Notice]:
+def check_plausible(fit: Fit, data: Dataset, others: Iterable[str] = ()) -> list[Notice]:
     """Return a notice if a fit cannot be this robot.
 
     Args:
-        others: What else was noticed: the cause is looked for there.
+        others: Codes of what else was noticed: the cause is looked for there.
     """
     why = implausible(fit, data)
     if why is None:
         return []
-    codes = {notice.code for notice in others}
+    codes = {*others}
     cause = next((code for code in CAUSES if code in codes), None)
     cure = (
-        "Check that it is this robot, and units, joint order, signs and targets of the data."
+        "Check that it is this robot, and units, joint order, signs, zeros and targets of the data."
         if cause is None
         else f"The cause is most likely what {cause} says; fix that and calibrate again."
     )
@@ -326,17 +333,31 @@ def check_robot(fit: Fit, data: Dataset) -> list[Notice]:
     Args:
         data: The readings it was made from.
     """
+    left, reach = _left_of_reach(fit, data)
+    if left > LARGEST_SHARE_LEFT * reach:  # lengths of a robot that does not fit are nobody's
+        return other_robot(fit.robot, data)
     lengths = Lengths.of(fit, data)
     if lengths.chance >= _SIGNIFICANT:
         return _check_growth(fit.robot, lengths)
     better = _Better.of(fit.robot, data)
+    cure = "Take the file of the robot that was measured."
+    if implausible(fit, data) is None:
+        cure += (
+            " If this is the one, enter the lengths that its controller computes with, or wider priors: corrections of "
+            "programs are wrong by what the lengths differ."
+        )
+    growth, deviations = lengths.growth
+    if chi_squared_tail(lengths.chi_squared - deviations**2, len(lengths.moved) - 1) >= _SIGNIFICANT:
+        cure += (
+            f" All its lengths come out {1.0 + growth:.3g} times as long, by one factor: a wrong length in the "
+            "measurement does that, too (the scale of the instrument, the distance between sockets or spheres, the "
+            "squares of a board)."
+        )
     return [
         WRONG_ROBOT(
             f"The readings are not of {fit.robot.name}, by its lengths: {listed(lengths.named())} off nominal. A robot "
             f"as good as its priors is so far off with a probability of {max(lengths.chance, 1e-16):.0e}."
-            f"{'' if better is None else better.text} Take the file of the robot that was measured. If this is the "
-            "one, enter the lengths that its controller computes with, or wider priors: corrections of programs are "
-            "wrong by what the lengths differ.",
+            f"{'' if better is None else better.text} {cure}",
             "error",
         )
     ]

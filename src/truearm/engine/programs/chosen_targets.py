@@ -54,7 +54,7 @@ def refuse_unanswered(questions: Iterable[Question | None]) -> None:
 #: What may have been taught with the robot itself.
 Taught = Literal["points", "frames", "tools"]
 TAUGHT: Final[tuple[Taught, ...]] = ("points", "frames", "tools")
-#: What FANUC's programs write behind the number of a position: P[13:seam].
+#: What FANUC's programs write behind the number of a position, some of the time: P[13:seam], P[13:"seam"].
 _COMMENT: Final = re.compile(r":[^\]]*(?=\]$)")
 #: Why a target stays, in words for a count: ``3 <words>``.
 Kept = Literal[
@@ -150,8 +150,13 @@ class Patterns:
         self._names: set[str] = set()
         for text in texts:
             # P[3] is a name of FANUC, and no pattern
-            wanted = re.compile(translate(text.replace("[", "[[]")), re.IGNORECASE)
-            matched = {name for name in names if wanted.match(name) or wanted.match(_COMMENT.sub("", name))}
+            whole, bare = (
+                re.compile(translate(wanted.replace("[", "[[]")), re.IGNORECASE)
+                for wanted in (text.replace('"', ""), _COMMENT.sub("", text))
+            )
+            matched = {
+                name for name in names if whole.match(name) or whole.match(_COMMENT.sub("", name)) or bare.match(name)
+            }
             if not matched:
                 raise InputError(
                     "no target of the programs has this name",

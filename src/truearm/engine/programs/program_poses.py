@@ -245,6 +245,8 @@ def provenance(
             came=missing[0] or own,
             cure=f"Give it one too, or none of them: without any, {without}.",
         )
+    if kind == "tool" and not needed and any(entry.identified is not None for entry in placed.values()):
+        return "identified"  # no target that is corrected has one
     return "identified" if known else "assumed"
 
 

@@ -220,8 +220,7 @@ def test_postures_visited_again_say_little_of_others(truth: str, seed: int, fold
     position = errors_of(truearm.load_robot(folder / "again" / "calibrated.yaml"), more_of(twin, 200, 0.0, 9)).position
     assert position is not None
     low, high = found.summary["expected_mm"]["interval_90"]
-    assert low < 1e3 * position.mean < (high or 2.0 * found.summary["expected_mm"]["mean"])
-    assert found.summary["validation"]["position_mm"]["mean"] > 0.8e3 * position.mean
+    assert low < 1e3 * position.mean < (high or 1.6 * found.summary["expected_mm"]["mean"])
 
 
 def test_copied_readings_count_once(folder: Path) -> None:

@@ -25,6 +25,7 @@ def test_postures_that_were_visited_again_are_known(off: float) -> None:
     q, of = joints(40, 5, off)
     found = postures_of(q, SIX)
     assert np.array_equal(found[:, None] == found, of[:, None] == of)
+    assert np.array_equal(found, [of.tolist().index(posture) for posture in of])
 
 
 def test_what_stands_like_others_stands_like_all_of_these() -> None:

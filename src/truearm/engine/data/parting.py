@@ -15,7 +15,7 @@ _SAME_LENGTH: Final = 1e-5
 
 
 def postures_of(joints: NDArray[np.float64], kinds: Sequence[str]) -> NDArray[np.intp]:
-    """Return a number for each configuration, the same one where the joints stand alike, ``(n,)``.
+    """Return for each configuration the index of the first one at which the joints stand alike, ``(n,)``.
 
     What stands like another one stands like all that stand like that.
 
@@ -41,7 +41,9 @@ def postures_of(joints: NDArray[np.float64], kinds: Sequence[str]) -> NDArray[np
             np.minimum.at(number, near, lower)
             np.minimum.at(number, near + lag, lower)
         if np.array_equal(number, before):
-            return np.asarray(number[np.argsort(order)][of_each.reshape(-1)])
+            number = number[np.argsort(order)][of_each.reshape(-1)]
+            _, first, alike = np.unique(number, return_index=True, return_inverse=True)
+            return np.asarray(first[alike.reshape(-1)])
 
 
 def parted(

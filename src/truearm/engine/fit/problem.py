@@ -179,11 +179,12 @@ class Problem:
     def standings(self) -> NDArray[np.intp]:
         """Index of the posture that each equation belongs to, ``(rows,)``: visits at which the joints stand alike.
 
-        What the model cannot follow is the same there. Configurations that were drawn to count twice stand alone, and
-        so do all where the problem comes in portions.
+        What the model cannot follow is the same there. Configurations that were drawn to count twice stand alone. So do
+        visits that the data tell apart, and all where the problem comes in portions.
         """
         data = self.data
-        if len(self.portions) > 1 or any(drawn_from(label) != label for label in data.labels):
+        drawn = any(drawn_from(label) != label for label in data.labels)
+        if drawn or data.visit is not None or len(self.portions) > 1:
             return self.visits
         posture = postures_of(data.joints, data.joint_kinds)
         of_blocks = [

@@ -172,9 +172,7 @@ def test_notices_say_that_the_tool_is_not_known() -> None:
     for name, arm in (("known", robot), ("unproven", replace(robot, proof=None))):
         result = corrected_programs(arm, [read], Cell({}, {}), choice=Choice(taught=frozenset()))
         levels[name] = {notice.code: notice.message for notice in check_correction(arm, result)}
-    assert levels["known"]["tools-assumed"].endswith(
-        "No reading tells where it really is; the errors to expect contain that."
-    )
+    assert levels["known"]["tools-assumed"].endswith("The errors to expect contain that.")
     assert "give `tools`, or measure more" in levels["known"]["not-better-here"]
     assert "errors to expect" not in levels["unproven"]["tools-assumed"]
 

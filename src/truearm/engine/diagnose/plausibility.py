@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Notice, Rule
+from truearm.engine.base.errors import InputError, Notice, Rule, has_error
 from truearm.engine.base.units import from_si
 from truearm.engine.data.checks import TARGET_MISSPELT
 from truearm.engine.data.dataset import Dataset
@@ -253,7 +253,7 @@ def check_against(robot: Robot, data: Dataset) -> Comparison:
     exchanged = exchanged_names(fit, data)
     unlike_robot = check_plausible(fit, data, [*(n.code for n in wrong), *(s.rule.code for s in exchanged)])
     if unlike_robot:
-        return Comparison([*wrong, *unlike_robot, *notices], exchanged)
+        return Comparison([*wrong, *([] if has_error(wrong) else unlike_robot), *notices], exchanged)
     doubted = check_few_to_doubt(fit)
     suspects: list[Suspect] = []
     turned = np.zeros(len(off), dtype=bool)

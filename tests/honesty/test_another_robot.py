@@ -76,9 +76,9 @@ def test_an_instrument_whose_scale_is_wrong_may_be_the_cause(tmp_path: Path) -> 
 
 def test_an_arm_of_another_maker_is_not_unrelated_rows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("truearm.engine.diagnose.wrong_robot.library", lambda: ("irb120", "ur5e"))
-    for measured, given in (("puma560", "irb120"), ("xarm6", "ur5e")):
+    for measured, given, code in (("puma560", "irb120", "wrong-robot"), ("xarm6", "ur5e", "implausible")):
         found = told("check", given, written(tmp_path, campaign_of(load_robot(measured), 30, 3)[1]))
-        assert found.says("implausible", "error"), found
+        assert found.says(code, "error"), found
         assert "rows-unrelated" not in found.levels
 
 

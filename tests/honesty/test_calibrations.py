@@ -343,7 +343,7 @@ def test_a_robot_that_changed_is_beyond_its_proof(folder: Path) -> None:
 def test_a_second_calibration_with_the_same_data_proves_nothing(folder: Path) -> None:
     calibrated(None, folder)
     robot = folder / "None" / "calibrated.yaml"
-    again = told("calibrate", robot, folder / "None.csv", "--seed", 1, "--out", folder / "again", "--model=geometric")
+    again = told("calibrate", robot, folder / "None.csv", "--seed", 1, "--out", folder / "twice", "--model=geometric")
     assert again.says("training-data", "warning", "held.out"), again
     fresh = written(folder, more_of(made(None)[0], 30, NOISE, 6), "later.csv")
     assert "training-data" not in told("calibrate", robot, fresh, "--out", folder / "later", "--model=geometric").levels

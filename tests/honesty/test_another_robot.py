@@ -82,6 +82,14 @@ def test_an_arm_of_another_maker_is_not_unrelated_rows(monkeypatch: pytest.Monke
         assert "rows-unrelated" not in found.levels
 
 
+def test_who_validates_it_hears_it_again(folder: Path) -> None:
+    calibrated("ur10", folder)
+    calibrated("ur10e", folder)
+    for name, is_wrong in (("ur10", True), ("ur10e", False)):
+        found = told("validate", folder / name / "calibrated.yaml", folder / "data.csv")
+        assert ("wrong-robot" in found.levels) is is_wrong, found
+
+
 def test_no_program_is_corrected_with_it_until_it_is_accepted(folder: Path) -> None:
     calibrated("ur10", folder)
     arm, program = folder / "ur10" / "calibrated.yaml", folder / "job.script"

@@ -12,7 +12,7 @@ from tests.honesty.telling import Told, told, written
 
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.robot.library import load_robot
-from truearm.engine.robot.parts import NO_PAYLOAD, LinkMass
+from truearm.engine.robot.parts import NO_PAYLOAD, LinkMass, Payload
 from truearm.engine.robot.robot import Robot
 from truearm.engine.twin.devices import named_device
 from truearm.engine.twin.devices.device import in_view_of, measured_with
@@ -94,3 +94,17 @@ def test_other_arms_are_not_doubted_either(seed: int, tmp_path: Path) -> None:
     file = written(tmp_path, read_by("markers", 40, robot, seed))
     found = told("calibrate", robot, file, "--out", tmp_path / "out")
     assert not doubts(found), found
+
+
+def test_another_payload_than_in_calibration_is_told_where_nobody_knows_what_the_arm_weighs(tmp_path: Path) -> None:
+    nominal, twin = giving_way("gp7", "markers", 1)
+    heavy = replace(twin, robot=twin.robot.with_payload(Payload(5.0, (0.0, 0.0, 0.1))))
+    device, rng = named_device("markers"), np.random.default_rng(2)
+    file, later = (written(tmp_path, measured_with(device, nominal, heavy, n, rng), f"{n}.csv") for n in (25, 20))
+    load = ("--payload", "5kg,0mm,0mm,100mm")
+    told("calibrate", "gp7", file, *load, "--model", "elastic", "--out", tmp_path / "out")
+    arm = tmp_path / "out" / "calibrated.yaml"
+    assert "loads-beyond-data" not in told("validate", arm, later).levels
+    assert "loads-beyond-data" not in told("validate", arm, later, *load).levels
+    light = told("validate", arm, later, "--payload", "1kg,0mm,0mm,50mm")
+    assert light.says("loads-beyond-data", "warning", "calibrated with 5 kg on the flange, and carries 1 kg"), light

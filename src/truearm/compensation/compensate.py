@@ -44,7 +44,7 @@ from truearm.engine.command.split import (
     known_of,
     refuse_unaccepted,
 )
-from truearm.engine.diagnose.external_force import check_force, check_payload
+from truearm.engine.diagnose.external_force import check_force, check_other_payload, check_payload
 from truearm.engine.programs.cell import (
     Cell,
     Placed,
@@ -132,7 +132,7 @@ def corrected(asked: Compensate) -> ProgramCorrection:
             *known_of(arm),
             *read.foreign,
             *controller_notices(arm, read.programs),
-            *_payloads_unlikely(arm, corrections.result),
+            *_payloads_unlikely(settings.calibrated, arm, corrections.result),
             *check_force(corrections.result.pushed),
             *corrections.accepted,
             *check_correction(arm, corrections.result, corrections.splits),
@@ -288,10 +288,11 @@ def _wrenches(arm: Robot, pushed: Wrench | None, file: Path | None) -> tuple[Tar
     return acting
 
 
-def _payloads_unlikely(arm: Robot, result: CorrectedPrograms) -> list[Notice]:
-    """Say which loads no arm of this size carries."""
+def _payloads_unlikely(calibrated: Robot, arm: Robot, result: CorrectedPrograms) -> list[Notice]:
+    """Say which loads no arm of this size carries, and that what another one than in calibration does is not known."""
     loads = [load for load in dict.fromkeys(result.loads.values()) if load is not None]
-    return [notice for load in [arm.payload, *loads] for notice in check_payload(arm.with_payload(load))][:1]
+    unlikely = [notice for load in [arm.payload, *loads] for notice in check_payload(arm.with_payload(load))]
+    return [*unlikely[:1], *check_other_payload(calibrated, [arm.payload, *loads])]
 
 
 def _refuse_taught_and_measured(choice: Choice, cell: Cell) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.engine.base.errors import InputError, Level, Notice, Rule, counted, degrees, listed, millimetres
+from truearm.engine.base.errors import LEVELS, InputError, Level, Notice, Rule, counted, degrees, listed, millimetres
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.observations import OBSERVATIONS
 from truearm.engine.data.statistics import Errors, errors_of
@@ -27,8 +27,10 @@ from truearm.engine.robot.transform import Transform
 # The calibration's proof holds the covariance of the parameters and the errors of the joints at a visit. Both moved
 # to the new configurations, with the noise of the new readings, say how far these may be off.
 
-#: Errors over what the proof lets expect, as root mean squares, from which the proof does not hold here: of one draw
-#: that moves all readings alike it is exceeded with a probability of 6e-5. And from which the robot is another one.
+#: Errors over what the proof lets expect, as root mean squares, from which the proof may not hold here, and from which
+#: it does not: of one draw that moves all readings alike they are exceeded with a probability of 5 % and of 6e-5. And
+#: from which the robot is another one.
+_NOTE: Final = 2.0
 _WARNING: Final = 4.0
 _ERROR: Final = 10.0
 #: So few readings for each of the others are named as what makes the errors, if the others are off by no more than so
@@ -41,9 +43,9 @@ _NOISE: Final = 1e-4
 
 BEYOND_PROOF: Final = Rule(
     "beyond-proof",
-    ("warning", "error"),
-    "positions are off by more than 4 times (10: error) what the robot's own [proof](results.md#files) lets expect "
-    "at these configurations, with their sigma (0.1 mm if none is declared); a proof that is a lower bound is "
+    ("warning", "error", "note"),
+    "positions are off by more than 4 times (10: error, 2: note) what the robot's own [proof](results.md#files) lets "
+    "expect at these configurations, with their sigma (0.1 mm if none is declared); a proof that is a lower bound is "
     "doubted from 10 times on, by a warning",
     gravity=2,
 )
@@ -78,8 +80,11 @@ def check_proof(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
     sigma = np.full(len(data.target), _NOISE) if data.sigma is None else data.sigma
     noise = 3.0 * float(np.nanmean(sigma[data.has_position] ** 2))
     off, expected = math.sqrt(float(np.mean(errors.position_norms**2))), math.sqrt(model + noise)
-    if off <= (_ERROR if proof.lower_bound else _WARNING) * expected:
+    steps = (_WARNING, _ERROR, math.inf) if proof.lower_bound else (_NOTE, _WARNING, _ERROR)
+    reached = sum(off > step * expected for step in steps)
+    if not reached:
         return []
+    level = LEVELS[reached - 1]
     assumed = f", with {_NOISE * 1e3:g} mm of noise, since no sigma is declared" if data.sigma is None else ""
     said = (
         f"The positions are off by {off * 1e3:.2g} mm (root mean square), {off / expected:.2g} times the "
@@ -93,12 +98,13 @@ def check_proof(robot: Robot, data: Dataset, errors: Errors) -> list[Notice]:
             f"That comes from {counted(len(far), 'reading')} (target at configuration): {listed(names)}. Without them "
             f"it is {np.sqrt(np.mean(near**2)) * 1e3:.2g} mm. Look at them before you doubt the robot."
         )
-        return [BEYOND_PROOF(said, "warning")]
+        return [BEYOND_PROOF(said, "note" if level == "note" else "warning")]
     said += (
         "The robot changed since, carries another payload, does what its model lacks, or the readings scatter more "
-        "than they declare: calibrate it again, and do not rely on its expected errors."
+        "than they declare"
     )
-    return [BEYOND_PROOF(said, "error" if off > _ERROR * expected and not proof.lower_bound else "warning")]
+    said += "." if level == "note" else ": calibrate it again, and do not rely on its expected errors."
+    return [BEYOND_PROOF(said, level)]
 
 
 # Are new readings in the frames of the calibration, with its tool, and of this robot at all.

@@ -14,7 +14,6 @@ from truearm.engine.base.errors import (
     Notice,
     Rule,
     counted,
-    has_error,
     name_parameter,
     name_place,
     refusals_of,
@@ -31,12 +30,12 @@ from truearm.engine.command.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.engine.command.split import TRAINING_DATA, changed_since, training_of
+from truearm.engine.command.split import TRAINING_DATA, changed_since, faults_of, training_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, Spread, errors_of
 from truearm.engine.data.thinning import check_duplicates
 from truearm.engine.diagnose.expected_error import error_by_order
-from truearm.engine.diagnose.external_force import check_force, check_payload
+from truearm.engine.diagnose.external_force import check_force, check_other_payload, check_payload
 from truearm.engine.diagnose.least_error import Kind, LeastError, least_errors
 from truearm.engine.diagnose.next_step import NextStep
 from truearm.engine.document.document import Block, each, say
@@ -219,10 +218,12 @@ def validated(asked: Validate) -> Validation:
         of_zones = zoned.means(read.data, errors)
     warnings = (
         *read.notices,
+        *faults_of(read.robot),
         *judged.mistaken,
         *check_duplicates(read.data),
         *read.other_session,
         *check_payload(read.robot),
+        *check_other_payload(read.as_calibrated, [read.robot.payload]),
         *check_force([(read.robot, read.data.postures)]),
         *_seen_in_training(read.robot, read.data, read.digest),
     )
@@ -235,7 +236,7 @@ def validated(asked: Validate) -> Validation:
         notes=dict(asked.notes or {}),
         orientations=orientation_errors(judged.robot, read.data, errors),
         distances=distances,
-        next=() if has_error(warnings) else measure_farther(distances),
+        next=() if any(notice.level != "note" for notice in warnings) else measure_farther(distances),
         robot=judged.robot,
         data=read.data,
         zones=of_zones,

@@ -14,6 +14,7 @@ from truearm.engine.diagnose.unmodelled import PAYLOAD, LeftOver, explanation
 from truearm.engine.robot.chain import Array
 from truearm.engine.robot.loads import joint_efforts
 from truearm.engine.robot.parameters import Parameter
+from truearm.engine.robot.parts import Payload
 from truearm.engine.robot.postures import Postures
 from truearm.engine.robot.robot import Robot
 from truearm.engine.robot.transform import IDENTITY, Transform
@@ -283,8 +284,9 @@ def _unseen(robot: Robot, bendings: Sequence[_Bending]) -> list[Notice]:
 LOADS_BEYOND_DATA: Final = Rule(
     "loads-beyond-data",
     "warning",
-    "joints are loaded farther beyond what they carried in calibration than half of that range",
-    cure="Measure with a heavier payload or with a force to know it.",
+    "joints are loaded farther beyond what they carried in calibration than half of that range, or with another "
+    "payload where the robot file has no masses of links",
+    cure="Calibrate with that load to know it.",
     gravity=2,
 )
 
@@ -307,6 +309,32 @@ def _beyond(robot: Robot, bendings: Sequence[_Bending]) -> list[Notice]:
         LOADS_BEYOND_DATA(
             f"The force loads joints beyond what they carried while they were measured: {words}. That they give way in "
             "proportion up to there is assumed."
+        )
+    ]
+
+
+def check_other_payload(calibrated: Robot, carried: Sequence[Payload]) -> list[Notice]:
+    """Return a notice if another payload than in calibration is carried, and nobody knows what the arm itself weighs.
+
+    What its own weight bends was taken for the payload's work then, or for geometry.
+
+    Args:
+        calibrated: The robot with what it carried in calibration.
+        carried: What it carries now.
+    """
+    if calibrated.proof is None or calibrated.masses or calibrated.balancers:
+        return []
+    other = next((payload for payload in carried if payload != calibrated.payload), None)
+    if other is None:
+        return []
+    before, now = (f"{load.mass:g} kg" if load.mass else "nothing" for load in (calibrated.payload, other))
+    if before == now:
+        now = "as much elsewhere"
+    return [
+        LOADS_BEYOND_DATA(
+            f"The robot was calibrated with {before} on the flange, and carries {now} here. Its file has no masses of "
+            "links, so what the arm's own weight bends was not told from what the payload bends. How this load bends "
+            "it is not known, and is not in the expected errors."
         )
     ]
 

@@ -296,7 +296,9 @@ def _of_left_over(
     if moved is not None:
         steps.append(about_change(*moved, known_moved * off.left))
     if candidate is not None and (moved is None or candidate.cause in LIKELY):  # what moved looks like an effect, too
-        steps.append(other_model(left.fit, candidate, remaining))
+        step = other_model(left.fit, candidate, remaining)
+        # After a check all effects are still to come: what they gain without the loads is not known.
+        steps.append(replace(step, gain=None) if checked and candidate.cause == LOADS else step)
     return steps, remaining
 
 

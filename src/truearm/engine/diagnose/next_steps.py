@@ -249,7 +249,8 @@ def steps_after_check(
     steps: list[NextStep] = []
     if left is not None and errors is not None:
         off = off_configurations(left)
-        lacking = explanation(left, off.indices)
+        # A robot that was calibrated with effects has them already: what is left is of something else.
+        lacking = None if left.fit.start.proof and left.fit.start.effects else explanation(left, off.indices)
         steps, _ = _of_left_over(left, off, moved, lacking, _known(errors), notices, checked=True)
     cures = _cures(notices, steps)
     if any(notice.code in MISNAMED for notice in notices):

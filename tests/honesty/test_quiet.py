@@ -88,6 +88,14 @@ def test_check_and_calibrate_name_the_same_configuration(shift: float, tmp_path:
     assert not doubts(told("check", "gp7", written(tmp_path, read_by("measurement-arm", 40))))
 
 
+def test_a_move_near_the_end_may_have_been_nearer_to_it(tmp_path: Path) -> None:
+    data = read_by("measurement-arm", 40)
+    for first, word in ((7, "earlier"), (22, None), (34, "later")):
+        message = told("check", "gp7", written(tmp_path, moved(data, first, 3e-3))).messages["instrument-moved"]
+        assert ("It may have been" in message) is (word is not None), message
+        assert word is None or f"It may have been {word}" in message
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_other_arms_are_not_doubted_either(seed: int, tmp_path: Path) -> None:
     robot = ("kr10_r1100", "tx2_60", "irb2600_12_1.85", "rs007l", "m20id_25", "xarm6")[seed]

@@ -229,7 +229,7 @@ def _check_effects(fit: Fit) -> list[Notice]:
         and not any(p.name in fit.free.names for p in effect.parameters)
         and all(robot.values[p.name] == p.value for p in effect.parameters)
     ]
-    if idle:
+    if idle and fit.start.proof is None:  # a calibrated robot has what its calibration had
         notices.append(
             EFFECTS_IDLE(
                 f"The robot file has the joint effects {', '.join(idle)} with all values zero, and the model "

@@ -88,8 +88,8 @@ class Case:
 
     @cached_property
     def moved(self) -> tuple[LeftOver, Change] | None:
-        """What moved during the campaign."""
-        return what_moved(self.left_by_few)
+        """What moved during the campaign; nothing is looked for where the data have an error."""
+        return None if has_error(self.of_data) else what_moved(self.left_by_few)
 
     @cached_property
     def changes(self) -> list[Notice]:

@@ -58,6 +58,7 @@ class Change:
     share: float  #: Of the squared residuals that it explains.
     values: tuple[float, ...]  #: What changed, in the parameters of its columns [SI].
     chance: float  #: Probability that noise alone shows one as large anywhere.
+    or_else: Literal["", "earlier", "later"] = ""  #: When it may have been too, where too few configurations tell it.
     by_file: bool = False  #: Whether the order of measurement is not known, and that of the file was taken.
     follows: int = 0  #: Number of the joint that moved on with the order of measurement; 0 if none did.
 
@@ -128,7 +129,10 @@ def find_change(left: LeftOver) -> Change | None:
     _, change = min(judged, key=lambda entry: entry[0])
     if change.chance >= _LARGEST_CHANCE or change.share <= _LEAST_SHARE:
         return None
-    return replace(change, by_file=data.number is None, follows=follows)
+    or_else: Literal["", "earlier", "later"] = ""
+    if change.kind != "drift" and place[change.first] in (every[0], every[-1]):
+        or_else = "earlier" if place[change.first] == every[0] else "later"
+    return replace(change, or_else=or_else, by_file=data.number is None, follows=follows)
 
 
 def _followed_joint(joints: Array) -> int:
@@ -284,6 +288,11 @@ def notices_of_change(left: LeftOver, change: Change) -> list[Notice]:
         words[change.kind] += (
             f" Joint {change.follows} moved on with the order of measurement, so what the model lacks at some of its "
             "positions, as the periodic error of a gear, looks like that too."
+        )
+    if change.or_else:
+        words[change.kind] += (
+            f" It may have been {change.or_else}: less than {LEAST_VISITS} configurations before or after it do not "
+            "tell where it was."
         )
     taken = (
         " The configurations are not numbered, so the order of the file was taken for that of measurement. If it is, "

@@ -30,7 +30,7 @@ from truearm.engine.command.arguments import (
     robot_argument,
     wrench_argument,
 )
-from truearm.engine.command.split import TRAINING_DATA, changed_since, faults_of, training_of
+from truearm.engine.command.split import TRAINING_DATA, calibration_errors, changed_since, training_of
 from truearm.engine.data.dataset import Dataset
 from truearm.engine.data.statistics import Errors, Spread, errors_of
 from truearm.engine.data.thinning import check_duplicates
@@ -218,7 +218,7 @@ def validated(asked: Validate) -> Validation:
         of_zones = zoned.means(read.data, errors)
     warnings = (
         *read.notices,
-        *faults_of(read.robot),
+        *calibration_errors(read.robot),
         *judged.mistaken,
         *check_duplicates(read.data),
         *read.other_session,

@@ -332,10 +332,15 @@ def changed_since(robot: object) -> list[Notice]:
     ]
 
 
+def calibration_errors(robot: Robot) -> list[Notice]:
+    """Return the errors of the calibration of a robot that is used all the same."""
+    return [Notice(name, message) for name, message in _against(robot).items()]
+
+
 def faults_of(robot: Robot) -> list[Notice]:
     """Return what speaks against the calibration of a robot that is used all the same."""
     return [
-        *(Notice(name, message) for name, message in _against(robot).items()),
+        *calibration_errors(robot),
         *(() if robot.proof is None else robot.proof.warnings),
         *_edited(robot),
     ]

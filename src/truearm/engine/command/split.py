@@ -333,14 +333,14 @@ def changed_since(robot: object) -> list[Notice]:
 
 
 def calibration_errors(robot: Robot) -> list[Notice]:
-    """Return the errors of the calibration of a robot that is used all the same."""
-    return [Notice(name, message) for name, message in _against(robot).items()]
+    """Return what speaks against the calibration of a robot wherever it is judged."""
+    return [Notice(name, message) for name, message in _against(robot).items() if name != _ELSEWHERE]
 
 
 def faults_of(robot: Robot) -> list[Notice]:
     """Return what speaks against the calibration of a robot that is used all the same."""
     return [
-        *calibration_errors(robot),
+        *(Notice(name, message) for name, message in _against(robot).items()),
         *(() if robot.proof is None else robot.proof.warnings),
         *_edited(robot),
     ]

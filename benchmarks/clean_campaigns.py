@@ -2,9 +2,9 @@
 
 Twenty robots are drawn from their priors, with joints that give way and repeat as arms do. A tracker reads three
 reflectors, markers are read as a pose, or four strings read distances; 10 to 300 configurations, with a load that is
-told or without. Each campaign goes through `check` and `calibrate` as they are by default. Small ones of every tenth
-robot also have each fault, one at a time. Arguments: campaigns (1000), and the first (0). Two processes. Writes
-benchmarks/clean_campaigns.json.
+told or without. Each campaign goes through `check` and `calibrate` as they are by default. In every tenth round of the
+robots those of few configurations also have each fault, one at a time. Arguments: campaigns (1000), and the first (0).
+Two processes. Writes benchmarks/clean_campaigns.json, which holds the first 804: that run was ended early.
 """
 
 from __future__ import annotations

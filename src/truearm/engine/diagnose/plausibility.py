@@ -354,7 +354,8 @@ def _far_from_fixtures(fit: Fit, data: Dataset) -> tuple[list[Notice], list[Susp
     doubted = np.flatnonzero(np.nan_to_num(off) > allowed_off(off)).tolist()
     places = [(data.labels[data.configuration[r]], data.targets[data.target[r]]) for r in doubted]
     suspects = [Suspect(OUTLIERS, *at, f"{off[r] * 1e3:.3g} mm off") for r, at in zip(doubted, places, strict=True)]
-    return [] if _gives_way(fit, data) else _unlike_its_readings(fit, data), suspects
+    unlike = _unlike_its_readings(fit, data)
+    return [] if unlike and _gives_way(fit, data) else unlike, suspects
 
 
 FIXTURE_MISPLACED: Final = Rule(

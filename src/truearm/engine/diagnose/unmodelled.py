@@ -195,11 +195,15 @@ class Explanation:
     together: float | None = None
 
 
-def with_causes(left: LeftOver, *causes: str) -> LeftOver:
-    """Return what a fit leaves whose free parameters could also take what causes explain, as far as they are open.
+def without_bending(left: LeftOver, *causes: str) -> LeftOver:
+    """Return what a fit leaves when geometry and joints that give way have taken what they can, whatever loads them.
 
     Causes of more derivatives than there may be are left out.
+
+    Args:
+        causes: What may take its part besides.
     """
+    causes = (GEOMETRY, Compliance.name, LOADS, *causes)
     problem = replace(left.problem, free=FreeParameters(()))
     robot, groups = _candidates(left, problem, causes)
     most = min(limit("parameters"), limit("derivatives") // problem.rows)
@@ -214,15 +218,6 @@ def with_causes(left: LeftOver, *causes: str) -> LeftOver:
     columns = left.without_parameters(J)
     U, s, _ = np.linalg.svd(columns, full_matrices=False)
     return replace(left, basis=np.concatenate([left.basis, U[:, s > 1.0]], axis=1))
-
-
-def without_bending(left: LeftOver, *causes: str) -> LeftOver:
-    """Return what a fit leaves when geometry and joints that give way have taken what they can, whatever loads them.
-
-    Args:
-        causes: What may take its part besides.
-    """
-    return with_causes(left, GEOMETRY, Compliance.name, LOADS, *causes)
 
 
 @dataclass(frozen=True, eq=False)
